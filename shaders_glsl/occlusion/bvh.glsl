@@ -1,0 +1,188 @@
+// What blocks a ray, found by walking the hierarchy that the host builds: any hit, the closest hit.
+//
+// Rays and hits are in scene space. A direction need not be of length 1: t counts lengths of it, in every instance
+// alike, and a hit lies strictly between t_min and t_max. Both sides of a triangle block, and so does all of its area:
+// alpha is not looked at. A ray with a coordinate that is not finite, or without a direction, meets nothing.
+#ifndef OCCLUSION_BVH_GLSL
+#define OCCLUSION_BVH_GLSL
+
+#include "shared/bvh_layout.glsl"
+
+layout(std430, binding = 20) readonly buffer BvhNodes { BvhNode bvh_nodes[]; };
+layout(std430, binding = 21) readonly buffer BvhTriangles { BvhTriangle bvh_triangles[]; };
+layout(std430, binding = 22) readonly buffer BvhInstances { BvhInstance bvh_instances[]; };
+
+// Entries of a traversal's stack: one for each node on a path suffices, and the host keeps to these depths.
+const uint BVH_STACK = BVH_SCENE_LEVELS + BVH_MESH_LEVELS;
+
+// Steps left to this invocation, for all its rays together. An ordinary ray takes tens to hundreds; lavapipe ends an
+// invocation without a word at 65,535 iterations of all its loops. The ray that takes the last one keeps what it has
+// found; what it has not found does not block: too bright rather than black. 0 tells a caller who wants to know.
+uint bvh_steps_left = 50000u;
+
+// Where a ray met a triangle.
+struct RayHit {
+  float t; // In lengths of the ray's direction.
+  uint instance; // As the host counts them.
+  uint triangle; // In the list of its mesh.
+  vec2 barycentrics; // Weights of its second and third corner.
+};
+
+// A ray in the space of one level, with what the tests of boxes and of triangles derive from its direction.
+struct BvhRay {
+  vec3 origin;
+  vec3 inverse; // One over the direction; finite.
+  uint axis; // The direction's longest component.
+  vec3 shear; // With that axis last: direction.xy / direction.z, 1 / direction.z.
+};
+
+// The components of v in turn, with `axis` last.
+vec3 bvh_turned(vec3 v, uint axis) {
+  return axis == 2u ? v : axis == 1u ? v.zxy : v.yzx;
+}
+
+BvhRay bvh_ray_in(BvhInstance space, vec3 origin, vec3 direction) {
+  vec4 point = vec4(origin, 1.0);
+  vec4 x = space.local_from_scene[0];
+  vec4 y = space.local_from_scene[1];
+  vec4 z = space.local_from_scene[2];
+  vec3 along = vec3(dot(x.xyz, direction), dot(y.xyz, direction), dot(z.xyz, direction));
+  vec3 size = abs(along);
+
+  BvhRay ray;
+  ray.origin = vec3(dot(x, point), dot(y, point), dot(z, point));
+  // With an inverse that is finite, a distance of 0 to a plane along the ray gives 0 and never NaN.
+  vec3 least = mix(vec3(1e-30), vec3(-1e-30), lessThan(along, vec3(0.0)));
+  ray.inverse = 1.0 / mix(along, least, lessThan(size, vec3(1e-30)));
+  ray.axis = size.z >= max(size.x, size.y) ? 2u : size.y >= size.x ? 1u : 0u;
+  vec3 turned = bvh_turned(along, ray.axis);
+  ray.shear = vec3(turned.xy, 1.0) / turned.z;
+  return ray;
+}
+
+// Where the ray is within a box: x enters, y leaves. Kay and Kajiya 1986; the last factor, 1 + 6 units of rounding,
+// covers three roundings on either side (Ize 2013, "Robust BVH ray traversal"), so no box of a met triangle is missed.
+vec2 bvh_box_span(BvhRay ray, vec3 lower, vec3 upper, float t_min) {
+  vec3 to_lower = (lower - ray.origin) * ray.inverse;
+  vec3 to_upper = (upper - ray.origin) * ray.inverse;
+  vec3 enter = min(to_lower, to_upper);
+  vec3 leave = max(to_lower, to_upper);
+  return vec2(max(max(enter.x, enter.y), max(enter.z, t_min)), min(min(leave.x, leave.y), leave.z) * 1.0000004);
+}
+
+// Tests one triangle: true where it is met between t_min and hit.t, which then moves there. The test of Woop, Benthin
+// and Wald 2013, "Watertight ray/triangle intersection": the ray becomes the z axis, and three 2D edge functions tell
+// its side of each edge. Two triangles that share an edge compute its function from the same two products, so they
+// agree to the bit as long as nothing is contracted; rounding is monotone, so a sign is right or the value is 0, and 0
+// counts for both. That closes the seam without the paper's recourse to doubles.
+bool bvh_meets(BvhRay ray, BvhTriangle triangle, float t_min, inout RayHit hit) {
+  vec3 a = bvh_turned(triangle.a - ray.origin, ray.axis);
+  vec3 b = bvh_turned(triangle.b - ray.origin, ray.axis);
+  vec3 c = bvh_turned(triangle.c - ray.origin, ray.axis);
+  precise vec2 a_sheared = a.xy - ray.shear.xy * a.z;
+  precise vec2 b_sheared = b.xy - ray.shear.xy * b.z;
+  precise vec2 c_sheared = c.xy - ray.shear.xy * c.z;
+  precise float u = c_sheared.x * b_sheared.y - c_sheared.y * b_sheared.x;
+  precise float v = a_sheared.x * c_sheared.y - a_sheared.y * c_sheared.x;
+  precise float w = b_sheared.x * a_sheared.y - b_sheared.y * a_sheared.x;
+  float doubled_area = u + v + w;
+  float t = (u * a.z + v * b.z + w * c.z) * ray.shear.z / doubled_area;
+  bool inside = min(u, min(v, w)) >= 0.0 || max(u, max(v, w)) <= 0.0;
+  // Seen edge-on, the area is 0 and so is every edge function.
+  if (!inside || doubled_area == 0.0 || !(t > t_min && t < hit.t)) {
+    return false;
+  }
+  hit.t = t;
+  hit.triangle = triangle.index;
+  hit.barycentrics = vec2(v, w) / doubled_area;
+  return true;
+}
+
+// One walk for both questions. The outer loop goes from the scene into an instance and back; the inner one walks a
+// level, and both levels with the same code, since a driver's compile time grows faster than its number of loops. Each
+// step of it tests one waiting triangle and opens one node, as SIMD drivers pay for both branches in any case.
+bool bvh_walk(vec3 origin, vec3 direction, float t_min, float t_max, bool any_will_do, out RayHit hit) {
+  hit = RayHit(t_max, 0u, 0u, vec2(0.0));
+  // Written so that NaN fails.
+  bool sound = all(lessThan(abs(origin), vec3(1e30))) && all(lessThan(abs(direction), vec3(1e30)));
+  if (!sound || direction == vec3(0.0)) {
+    return false;
+  }
+  bool found = false;
+  uint instance = 0u;
+  uint stack[BVH_STACK];
+  stack[0] = bvh_instances[0].root;
+  uint height = 1u;
+
+  while ((instance != 0u || height > 0u) && bvh_steps_left > 0u) {
+    --bvh_steps_left;
+    BvhInstance space = bvh_instances[instance];
+    BvhRay ray = bvh_ray_in(space, origin, direction);
+    uint floor_height = instance == 0u ? 0u : height; // What lies below belongs to the level above.
+    uint cursor = space.root; // What to visit next.
+    if (instance == 0u) {
+      --height;
+      cursor = stack[height];
+    }
+    uint next_instance = 0u;
+    uint triangle = 0u; // From here to the end, the triangles of a leaf wait for their test.
+    uint triangles_end = 0u;
+
+    while (next_instance == 0u && (cursor != BVH_NOTHING || triangle < triangles_end) && bvh_steps_left > 0u) {
+      --bvh_steps_left;
+      if (triangle < triangles_end) {
+        if (bvh_meets(ray, bvh_triangles[triangle], t_min, hit)) {
+          found = true;
+          hit.instance = instance - 1u;
+          if (any_will_do) {
+            return true;
+          }
+        }
+        ++triangle;
+      }
+      if (cursor < BVH_LEAF) {
+        BvhNode node = bvh_nodes[cursor];
+        vec2 span_0 = bvh_box_span(ray, node.lower_0, node.upper_0, t_min);
+        vec2 span_1 = bvh_box_span(ray, node.lower_1, node.upper_1, t_min);
+        bool meets_0 = span_0.x <= span_0.y && span_0.x < hit.t;
+        bool meets_1 = span_1.x <= span_1.y && span_1.x < hit.t;
+        bool first_is_near = meets_0 && !(meets_1 && span_1.x < span_0.x);
+        if (meets_0 && meets_1) {
+          stack[height] = first_is_near ? node.child_1 : node.child_0;
+          ++height;
+        }
+        cursor = first_is_near ? node.child_0 : meets_1 ? node.child_1 : BVH_NOTHING;
+      }
+      // Nodes go on ahead of the waiting triangles; the next leaf does not.
+      if (cursor >= BVH_LEAF && cursor != BVH_NOTHING && triangle == triangles_end) {
+        uint first = cursor & ((1u << BVH_FIRST_BITS) - 1u);
+        if (instance == 0u) {
+          next_instance = first;
+        } else {
+          triangle = first;
+          triangles_end = first + ((cursor >> BVH_FIRST_BITS) & 3u) + 1u;
+        }
+        cursor = BVH_NOTHING;
+      }
+      if (cursor == BVH_NOTHING && next_instance == 0u && height > floor_height) {
+        --height;
+        cursor = stack[height];
+      }
+    }
+    instance = next_instance;
+  }
+  return found;
+}
+
+// Whether anything blocks the ray between t_min and t_max.
+bool occluded(vec3 origin, vec3 direction, float t_min, float t_max) {
+  RayHit hit;
+  return bvh_walk(origin, direction, t_min, t_max, true, hit);
+}
+
+// What blocks the ray first between t_min and t_max. Where nothing does, hit.t is t_max and the rest is 0.
+bool closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, out RayHit hit) {
+  return bvh_walk(origin, direction, t_min, t_max, false, hit);
+}
+
+#endif

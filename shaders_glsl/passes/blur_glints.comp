@@ -1,0 +1,24 @@
+// Blurs the glints along one axis (Wang, Deng and Holzschuch 2020, section 5.3).
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared/frame.glsl"
+#include "shared/blur.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(binding = 30) uniform texture2D source;
+layout(binding = 40, rgba32f) uniform writeonly image2D blurred_image;
+layout(push_constant) uniform Params {
+  ivec2 axis; // (1, 0) or (0, 1).
+  int radius; // Taps on each side of the centre.
+  float weights[5]; // Of the centre and of the taps on each side.
+};
+
+void main() {
+  uvec2 pixel = gl_GlobalInvocationID.xy;
+  if (outside_frame(pixel)) {
+    return;
+  }
+  ivec2 at = ivec2(pixel);
+  ivec2 size = ivec2(frame.width, frame.height);
+  imageStore(blurred_image, at, blurred(source, at, size, axis, radius, weights));
+}

@@ -1,0 +1,26 @@
+// Whether the mirror direction of each glinting pixel is free: one ray, as in Wang, Deng and Holzschuch 2020, section 5.3.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared/frame.glsl"
+#include "shared/gbuffer.glsl"
+#include "shared/materials.glsl"
+#include "shared/ray_offset.glsl"
+#include "occlusion.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(binding = 40, r32f) uniform writeonly image2D visibility; // 1 free, 0 occluded; 1 where nothing glints.
+
+void main() {
+  uvec2 pixel = gl_GlobalInvocationID.xy;
+  if (outside_frame(pixel)) {
+    return;
+  }
+  Seen seen = seen_at(pixel);
+  float free = 1.0;
+  if (seen.instance != 0u && (materials[instances[seen.instance - 1u].material].flags & MATERIAL_GLINTS) != 0u) {
+    vec3 mirrored = reflect(normalize(camera_ray(pixel)), seen.normal);
+    vec3 origin = offset_origin(seen.position, seen.geometric_normal);
+    free = occluded(origin, mirrored, 0.0, 1e30) ? 0.0 : 1.0;
+  }
+  imageStore(visibility, ivec2(pixel), vec4(free));
+}

@@ -1,0 +1,37 @@
+// Frames about a normal, directions as two numbers, low-discrepancy points.
+#ifndef DIRECTIONS_GLSL
+#define DIRECTIONS_GLSL
+#include "shared/constants.glsl"
+
+// Columns: two tangents and the normal. Duff et al. 2017, "Building an Orthonormal Basis, Revisited": no singular
+// direction, orthonormal to 6e-8.
+mat3 frame_about(vec3 normal) {
+  float side = normal.z < 0.0 ? -1.0 : 1.0;
+  float a = -1.0 / (side + normal.z);
+  float b = normal.x * normal.y * a;
+  vec3 tangent = vec3(1.0 + side * normal.x * normal.x * a, side * b, -side * normal.x);
+  vec3 bitangent = vec3(b, side + normal.y * normal.y * a, -normal.y);
+  return mat3(tangent, bitangent, normal);
+}
+
+// A unit vector on the octahedron, unfolded to -1..1 (Cigolle et al. 2014).
+vec2 octahedral_from(vec3 direction) {
+  vec2 flat_part = direction.xy / (abs(direction.x) + abs(direction.y) + abs(direction.z));
+  vec2 signs = vec2(flat_part.x < 0.0 ? -1.0 : 1.0, flat_part.y < 0.0 ? -1.0 : 1.0);
+  return direction.z < 0.0 ? (1.0 - abs(flat_part.yx)) * signs : flat_part;
+}
+
+vec3 direction_from(vec2 octahedral) {
+  vec3 direction = vec3(octahedral, 1.0 - abs(octahedral.x) - abs(octahedral.y));
+  float below = max(-direction.z, 0.0);
+  direction.x += direction.x < 0.0 ? below : -below;
+  direction.y += direction.y < 0.0 ? below : -below;
+  return normalize(direction);
+}
+
+// Point `index` of `count` of the Hammersley set, inside the unit square.
+vec2 hammersley(uint index, uint count) {
+  return vec2((float(index) + 0.5) / float(count), (float(bitfieldReverse(index) >> 8) + 0.5) * (1.0 / 16777216.0));
+}
+
+#endif
