@@ -1,0 +1,199 @@
+//! How glints are estimated: each method in a file of its own, which says what it claims and what it can be set to.
+
+mod smooth;
+mod wang2020;
+
+use crate::environment_tables::EnvironmentTables;
+use crate::passes::GBuffer;
+use crate::scene_buffers::SceneBuffers;
+use crate::settings::{Kind, Setting, SettingError, Value, Values};
+use crate::{Cache, Progress, RenderError, Update};
+use mica_gpu::Executor;
+use mica_graph::{Buffer, Graph, Image};
+
+/// What a method promises of its pictures; the tests hold it to this.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Claim {
+    /// The very flakes, pixel by pixel.
+    Pixels,
+    /// The distribution of pixel values.
+    Distribution,
+    /// The mean.
+    Mean,
+    /// A look.
+    Look,
+}
+
+impl Claim {
+    /// The word used in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Pixels => "pixels",
+            Self::Distribution => "distribution",
+            Self::Mean => "mean",
+            Self::Look => "look",
+        }
+    }
+}
+
+/// A point on a method's curve of accuracy against time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rung {
+    /// Name of the point.
+    pub name: &'static str,
+    /// What to set, as `KEY=VALUE`.
+    pub set: &'static [(&'static str, &'static str)],
+}
+
+/// What a method says of itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MethodInfo {
+    /// Its name on command lines and in glTF extras.
+    pub name: &'static str,
+    /// Where it was published.
+    pub citation: &'static str,
+    /// What it does, in a sentence or two.
+    pub summary: &'static str,
+    /// What it promises.
+    pub claim: Claim,
+    /// Its settings beyond those that every method has.
+    pub settings: &'static [Setting],
+    /// From cheap to dear.
+    pub ladder: &'static [Rung],
+}
+
+/// The methods there are.
+pub const METHODS: &[MethodInfo] = &[smooth::INFO, wang2020::INFO];
+
+/// The method of materials that name none.
+pub const DEFAULT_METHOD: &str = "wang2020";
+
+/// What every method takes: the same physical material, whoever renders it.
+pub const COMMON_SETTINGS: &[Setting] = &[
+    Setting {
+        key: "count",
+        unit: "flakes per UV square",
+        kind: Kind::Real { min: 0.0, max: 1e12 },
+        default: Value::Number(1e6),
+        meaning: "How many flakes there are.",
+    },
+    Setting {
+        key: "alpha",
+        unit: "",
+        kind: Kind::Real { min: 0.001, max: 1.0 },
+        default: Value::Number(0.1),
+        meaning: "Beckmann roughness of the flakes' normals; their slopes have variance alpha^2/2 an axis.",
+    },
+    Setting {
+        key: "gamma_deg",
+        unit: "degrees",
+        kind: Kind::Real { min: 0.01, max: 30.0 },
+        default: Value::Number(6.0),
+        meaning: "Half-angle of the cone into which a flake reflects a ray.",
+    },
+    Setting {
+        key: "seed",
+        unit: "",
+        kind: Kind::Integer { min: 0, max: u32::MAX as u64 },
+        default: Value::Number(0.0),
+        meaning: "Chooses the flakes.",
+    },
+    Setting {
+        key: "uv_scale",
+        unit: "UV squares per texture coordinate",
+        kind: Kind::Real { min: 1e-6, max: 1e6 },
+        default: Value::Number(1.0),
+        meaning: "Texture coordinates are multiplied by it before flakes are placed.",
+    },
+    Setting {
+        key: "color",
+        unit: "",
+        kind: Kind::Color,
+        default: Value::Color([1.0, 1.0, 1.0]),
+        meaning: "Reflectance of a flake at normal incidence.",
+    },
+];
+
+/// A method by its name.
+pub fn method(name: &str) -> Result<&'static MethodInfo, SettingError> {
+    METHODS.iter().find(|method| method.name == name).ok_or_else(|| SettingError::NoMethod {
+        name: name.to_owned(),
+        known: METHODS.iter().map(|method| method.name).collect::<Vec<_>>().join(", "),
+    })
+}
+
+impl MethodInfo {
+    /// All its settings at their defaults.
+    pub fn values(&self) -> Values {
+        Values::new(COMMON_SETTINGS.iter().chain(self.settings).copied().collect())
+    }
+}
+
+/// A glinting material of a scene, with the settings it is rendered with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GlintMaterial {
+    /// Which of the scene's materials it is.
+    pub index: usize,
+    /// Its name.
+    pub name: String,
+    /// The method that renders it.
+    pub method: &'static MethodInfo,
+    /// The method's settings.
+    pub values: Values,
+    /// Which set of texture coordinates the flakes lie in.
+    pub uv_set: u32,
+}
+
+/// What a method may read when it shades.
+pub(crate) struct Shading<'a> {
+    pub scene: &'a SceneBuffers,
+    pub frame: &'a Buffer,
+    pub gbuffer: &'a GBuffer,
+    pub shadow_mask: &'a Image,
+}
+
+/// A method at work: its tables, and the passes that fill and read them.
+pub(crate) trait Method {
+    /// Makes, on a device of our own, what takes too long for a frame or is worth keeping between runs. Optional: a
+    /// frame declares what it needs itself.
+    fn precompute(
+        &mut self,
+        _material: &GlintMaterial,
+        _executor: &mut Executor,
+        _cache: Option<&Cache>,
+        _progress: Progress,
+    ) -> Result<Vec<Update>, RenderError> {
+        Ok(Vec::new())
+    }
+
+    /// Gives back the tables of all materials but these.
+    fn keep(&mut self, _materials: &[GlintMaterial]) {}
+
+    /// Declares the passes that bring this material's tables up to date; none where nothing they depend on changed.
+    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables);
+
+    /// Declares the pass that writes this material's pixels of `glints`.
+    fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image);
+
+    /// What is to happen to the shaded glints.
+    fn finish(&self, material: &GlintMaterial) -> Finish;
+}
+
+/// What a method asks for after shading.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Finish {
+    /// The visibility of the mirror direction dims the glints.
+    pub mirror_occlusion: bool,
+    /// Taps on each side of the centre of the visibility's blur.
+    pub visibility_blur: i32,
+    /// Taps on each side of the centre of the glints' blur.
+    pub glint_blur: i32,
+}
+
+/// The method of that name, at work.
+pub(crate) fn start(info: &MethodInfo) -> Box<dyn Method> {
+    match info.name {
+        "wang2020" => Box::new(wang2020::Wang2020::default()),
+        _ => Box::new(smooth::Smooth::default()),
+    }
+}

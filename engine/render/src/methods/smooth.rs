@@ -1,0 +1,59 @@
+//! The limit of infinitely many flakes: a smooth Beckmann lobe (Beckmann and Spizzichino 1963; Walter et al. 2007).
+//!
+//! The environment's part is a split sum (Karis 2013): exact in the lobe's albedo, approximate in the lobe's shape.
+
+use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading};
+use crate::environment_tables::{EnvironmentTables, Lobe};
+use mica_graph::{Graph, Image};
+use mica_shaders::glints::smooth::{Bind, Params};
+
+pub(super) const INFO: MethodInfo = MethodInfo {
+    name: "smooth",
+    citation: "P. Beckmann and A. Spizzichino, The Scattering of Electromagnetic Waves from Rough Surfaces, 1963; \
+               B. Walter et al., Microfacet Models for Refraction through Rough Surfaces, EGSR 2007",
+    summary: "The same surface without glints: what infinitely many flakes look like.",
+    claim: Claim::Mean,
+    settings: &[],
+    ladder: &[Rung { name: "smooth", set: &[] }],
+};
+
+/// The smooth limit at work. It needs no tables of its own, only the environment's.
+#[derive(Default)]
+pub(crate) struct Smooth {
+    lobe: Option<Lobe>,
+}
+
+impl Method for Smooth {
+    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables) {
+        if self.lobe.is_none() {
+            g.because(format!("material {}: smooth lobe under the environment; first frame", material.name));
+            self.lobe = Some(environment.beckmann(g));
+        }
+    }
+
+    fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
+        let Some(lobe) = &self.lobe else { return };
+        let params = Params { material: material.index as u32, alpha: material.values.number("alpha") as f32 };
+        let bind = Bind {
+            frame: shading.frame,
+            instances: &shading.scene.instances.buffer,
+            lights: &shading.scene.lights.buffer,
+            ids: &shading.gbuffer.ids,
+            position: &shading.gbuffer.position,
+            normal: &shading.gbuffer.normal,
+            uv: &shading.gbuffer.uv,
+            footprint: &shading.gbuffer.footprint,
+            specular: &shading.gbuffer.specular,
+            shadow_mask: shading.shadow_mask,
+            prefiltered: &lobe.prefiltered,
+            albedo: &lobe.albedo,
+            glints: &mut *glints,
+        };
+        // Its own name: it shares the frame of the glints' shader, but there are no glints.
+        g.pass_named(INFO.name, bind, params, shading.gbuffer.ids.extent());
+    }
+
+    fn finish(&self, _material: &GlintMaterial) -> Finish {
+        Finish::default()
+    }
+}

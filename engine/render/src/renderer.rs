@@ -1,0 +1,440 @@
+//! A scene made into frames.
+
+use crate::environment_tables::EnvironmentTables;
+use crate::methods::{self, Finish, Method, Shading};
+use crate::scene::{AlphaMode, Atlas, AtlasLimits, EquirectMap, Light, Material, Scene};
+use crate::scene_buffers::SceneBuffers;
+use crate::settings::{SettingError, Value};
+use crate::{Cache, DEFAULT_METHOD, GlintMaterial, RenderError, View, passes};
+use mica_gpu::Executor;
+use mica_graph::{Buffer, Extent, Format, Graph, Image, ImageDesc, Lifetime};
+use mica_shaders::{constants as c, types};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Who answers whether something lies between two points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OcclusionBackend {
+    /// Nobody: everything is visible.
+    None,
+    /// A hierarchy of bounding volumes, traversed in compute shaders.
+    Bvh,
+}
+
+impl OcclusionBackend {
+    /// The word used in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Bvh => "bvh",
+        }
+    }
+}
+
+/// Light from everywhere.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Environment {
+    /// Its radiance.
+    pub map: EquirectMap,
+    /// How far it is turned about +Y, counter-clockwise seen from above, in radians.
+    pub rotation_radians: f64,
+}
+
+/// Something that was not simulated, and why.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LeftOut {
+    /// The effect or pass.
+    pub what: &'static str,
+    /// Why this scene or these settings do not call for it.
+    pub why: String,
+}
+
+/// A frame that was declared.
+pub struct Frame {
+    /// Linear, scene-referred radiance.
+    pub radiance: Image,
+    /// Tone-mapped, sRGB-encoded.
+    pub display: Image,
+    /// The passes, by index in the graph, that bring tables up to date rather than draw.
+    pub updates: std::ops::Range<usize>,
+    /// What the frame does without.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// Hears how far long work has come: what it is, steps done, steps in all.
+pub type Progress<'a> = &'a mut dyn FnMut(&str, u64, u64);
+
+/// Work that brought a table up to date.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Update {
+    /// The pass.
+    pub pass: String,
+    /// What changed.
+    pub why: String,
+    /// How long it took, in nanoseconds.
+    pub ns: u64,
+}
+
+/// A scene on a device.
+pub struct Renderer {
+    scene: Scene,
+    buffers: SceneBuffers,
+    environment: EnvironmentTables,
+    rotation_radians: f64,
+    occlusion: OcclusionBackend,
+    materials: Vec<GlintMaterial>,
+    methods: BTreeMap<&'static str, Box<dyn Method>>,
+    /// Stands for the shadow mask where there are no lights: shaders bind it but do not read it.
+    no_lights: Image,
+    /// The mean over the frames of one view, and how many there are in it.
+    mean: Option<Image>,
+}
+
+impl Renderer {
+    /// Prepares a scene: nothing touches the device until a frame that was declared is executed.
+    ///
+    /// `lights` are added to the scene's own.
+    pub fn new(
+        scene: Scene,
+        lights: &[Light],
+        environment: Option<&Environment>,
+        occlusion: OcclusionBackend,
+    ) -> Result<Self, RenderError> {
+        let all_lights: Vec<Light> = scene.lights.iter().chain(lights).copied().collect();
+        if all_lights.len() > c::MAX_LIGHTS as usize {
+            return Err(RenderError::TooManyLights { count: all_lights.len(), limit: c::MAX_LIGHTS as usize });
+        }
+        for (what, why) in unrendered(&scene) {
+            log::warn!("{what}: {why}");
+        }
+        let atlas = Atlas::pack(&scene.textures, AtlasLimits::default());
+        let buffers = SceneBuffers::new(&scene, &all_lights, &atlas)?;
+        let environment_tables = EnvironmentTables::new(environment.map(|environment| &environment.map), 0)?;
+        let materials = glint_materials(&scene);
+        let one = ImageDesc::new(Format::R32Uint, Extent::new(1, 1));
+        Ok(Self {
+            scene,
+            buffers,
+            environment: environment_tables,
+            rotation_radians: environment.map_or(0.0, |environment| environment.rotation_radians),
+            occlusion,
+            materials,
+            methods: BTreeMap::new(),
+            no_lights: Image::new("no_lights", one, Lifetime::Scene),
+            mean: None,
+        })
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The glinting materials, with their settings.
+    pub fn materials(&self) -> &[GlintMaterial] {
+        &self.materials
+    }
+
+    /// Who answers questions about occlusion.
+    pub fn occlusion(&self) -> OcclusionBackend {
+        self.occlusion
+    }
+
+    /// Changes the method of one glinting material, by name, or of all of them. Settings that both methods have are kept.
+    pub fn set_method(&mut self, material: Option<&str>, method: &str) -> Result<(), SettingError> {
+        let info = methods::method(method)?;
+        for material in self.chosen(material)? {
+            let mut values = info.values();
+            for (key, value) in material.values.iter() {
+                values.set(key, value);
+            }
+            material.values = values;
+            material.method = info;
+        }
+        let used: Vec<&str> = self.materials.iter().map(|material| material.method.name).collect();
+        // The tables of a method that nothing uses any more are given back.
+        self.methods.retain(|name, _| used.contains(name));
+        Ok(())
+    }
+
+    /// Changes a setting of one glinting material, by name, or of all of them. The next frame updates what depends on it.
+    ///
+    /// Without a name, a key that only some of the materials' methods have is set for those.
+    pub fn set(&mut self, material: Option<&str>, key: &str, value: &str) -> Result<(), SettingError> {
+        if material.is_none() && self.materials.is_empty() {
+            // Nothing to set, but a mistake is one all the same.
+            return methods::method(DEFAULT_METHOD)?.values().parse(DEFAULT_METHOD, key, value);
+        }
+        // Nothing is changed if anything is wrong.
+        let mut known = Vec::new();
+        let mut unknown = None;
+        for material in self.chosen(material)? {
+            let mut values = material.values.clone();
+            match values.parse(material.method.name, key, value) {
+                Ok(()) => known.push((material, values)),
+                Err(error @ SettingError::Unknown { .. }) => unknown = Some(error),
+                Err(error) => return Err(error),
+            }
+        }
+        match unknown {
+            Some(error) if known.is_empty() => Err(error),
+            _ => {
+                known.into_iter().for_each(|(material, values)| material.values = values);
+                Ok(())
+            }
+        }
+    }
+
+    fn chosen(&mut self, name: Option<&str>) -> Result<Vec<&mut GlintMaterial>, SettingError> {
+        let known: Vec<String> = self.materials.iter().map(|material| material.name.clone()).collect();
+        let chosen: Vec<_> =
+            self.materials.iter_mut().filter(|material| name.is_none_or(|name| material.name == name)).collect();
+        match name {
+            Some(name) if chosen.is_empty() => {
+                let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+                Err(SettingError::NoMaterial { name: name.to_owned(), known })
+            }
+            _ => Ok(chosen),
+        }
+    }
+
+    /// Makes what takes too long for a frame, or is worth keeping between runs, on a device of our own. A host that only
+    /// records frames does without: frames declare what they need themselves.
+    pub fn precompute(
+        &mut self,
+        executor: &mut Executor,
+        cache: Option<&Cache>,
+        progress: Progress,
+    ) -> Result<Vec<Update>, RenderError> {
+        let mut updates = Vec::new();
+        for material in self.materials.iter().filter(|material| glints(material)) {
+            let method = self.methods.entry(material.method.name).or_insert_with(|| methods::start(material.method));
+            updates.extend(method.precompute(material, executor, cache, &mut *progress)?);
+        }
+        Ok(updates)
+    }
+
+    /// Declares a frame: updates of what changed since the last one, then the passes that draw.
+    ///
+    /// With `earlier`, the frame shows the mean of itself and so many frames before it, each from its own
+    /// [`View::sample`]; `Some(0)` starts anew, and so does another size or a frame without.
+    ///
+    /// The frame has to be executed, and frames in the order in which they were declared: what is uploaded or built in
+    /// one is there for the next. After a frame that was lost, make a new renderer.
+    pub fn frame(&mut self, g: &mut Graph, view: &View, earlier: Option<u32>) -> Result<Frame, RenderError> {
+        let [width, height] = view.size;
+        let extent = Extent::new(width, height);
+        let mut left_out = Vec::new();
+        let glinting: Vec<GlintMaterial> = self.materials.iter().filter(|material| glints(material)).cloned().collect();
+        let lit = self.buffers.light_count > 0;
+
+        // Materials that ask for the same after shading share a layer.
+        let mut layers: Vec<(Finish, Vec<GlintMaterial>)> = Vec::new();
+        for material in &glinting {
+            let method = self.methods.entry(material.method.name).or_insert_with(|| methods::start(material.method));
+            let finish = method.finish(material);
+            match layers.iter_mut().find(|(of, _)| *of == finish) {
+                Some((_, materials)) => materials.push(material.clone()),
+                None => layers.push((finish, vec![material.clone()])),
+            }
+        }
+        for (name, method) in &mut self.methods {
+            let of_method = glinting.iter().filter(|material| material.method.name == *name);
+            method.keep(&of_method.cloned().collect::<Vec<_>>());
+        }
+        let mirror_occlusion = layers.iter().any(|(finish, _)| finish.mirror_occlusion);
+        let traced = self.occlusion == OcclusionBackend::Bvh;
+        if traced && (lit || mirror_occlusion) {
+            self.buffers.build_bvh(&self.scene)?;
+        }
+
+        let first_update = g.passes().len();
+        g.because("first frame of the scene");
+        self.buffers.upload(g);
+        g.because("first frame of the environment");
+        self.environment.update(g);
+        for material in &glinting {
+            if let Some(method) = self.methods.get_mut(material.method.name) {
+                method.update(g, material, &mut self.environment);
+            }
+        }
+        let updates = first_update..g.passes().len();
+        // Like the frame's constants: no table is made from them.
+        self.buffers.upload_materials(g, &glinting);
+
+        g.because("every frame");
+        let frame = self.upload_frame(g, view);
+        let ids = passes::visibility::visibility(g, &self.buffers, &frame, extent);
+        let gbuffer = passes::surface::surface(g, &self.buffers, &frame, ids);
+        let shadow_mask = match &self.buffers.bvh {
+            Some(bvh) if lit && traced => {
+                g.because(format!("{} lights cast shadows", self.buffers.light_count));
+                Some(passes::shadows::shadows(g, &self.buffers, bvh, &frame, &gbuffer))
+            }
+            _ => {
+                let why = if lit { "occlusion is off" } else { "no point, directional or spot lights" };
+                left_out.push(LeftOut { what: "shadows", why: why.to_owned() });
+                lit.then(|| {
+                    g.because("occlusion is off: every light arrives");
+                    let mut open = g.image("shadow_mask", Format::R32Uint, extent);
+                    g.clear(&mut open, 0.0);
+                    open
+                })
+            }
+        };
+        // Without lights no shader reads it.
+        let shadow_mask = shadow_mask.as_ref().unwrap_or(&self.no_lights);
+        g.because("every frame");
+        let base = passes::base::base(g, &self.buffers, &self.environment, &frame, &gbuffer, shadow_mask);
+        let shading = Shading { scene: &self.buffers, frame: &frame, gbuffer: &gbuffer, shadow_mask };
+        let mut radiance = base;
+        for (finish, materials) in &layers {
+            let layer = self.specular_layer(g, materials, &shading, *finish);
+            let visibility = self.mirror_visibility(g, &shading, *finish);
+            g.because("what the flakes reflect is added to the rest");
+            radiance = passes::composite::composite(g, &frame, &gbuffer, &radiance, &layer, visibility.as_ref());
+        }
+        self.explain_absent(&glinting, mirror_occlusion, &mut left_out);
+        let radiance = self.accumulate(g, &frame, radiance, earlier);
+        g.because("every frame");
+        let display = passes::tonemap::tonemap(g, &frame, &radiance, view.exposure);
+        Ok(Frame { radiance, display, updates, left_out })
+    }
+
+    /// What the flakes of each pixel reflect, by the method of its material.
+    fn specular_layer(&self, g: &mut Graph, glinting: &[GlintMaterial], shading: &Shading, finish: Finish) -> Image {
+        let mut layer = g.image("specular_layer", Format::Rgba32Float, shading.gbuffer.ids.extent());
+        g.because("each material writes its own pixels only");
+        g.clear(&mut layer, 0.0);
+        for material in glinting {
+            g.because(format!("material {} glints by method {}", material.name, material.method.name));
+            if let Some(method) = self.methods.get(material.method.name) {
+                method.shade(g, material, shading, &mut layer);
+            }
+        }
+        if finish.glint_blur > 0 {
+            g.because("the method blurs its glints");
+            layer = passes::blur::blur_glints(g, shading.frame, layer, finish.glint_blur);
+        }
+        layer
+    }
+
+    /// How free the mirror direction of each pixel is, if a method asks for it.
+    fn mirror_visibility(&self, g: &mut Graph, shading: &Shading, finish: Finish) -> Option<Image> {
+        let traced = self.occlusion == OcclusionBackend::Bvh && finish.mirror_occlusion;
+        let bvh = self.buffers.bvh.as_ref().filter(|_| traced)?;
+        g.because("the method dims glints whose mirror direction is occluded");
+        let visibility = passes::occlusion::occlusion(g, shading.scene, bvh, shading.frame, shading.gbuffer);
+        Some(match finish.visibility_blur {
+            0 => visibility,
+            radius => passes::blur::blur_visibility(g, shading.frame, visibility, radius),
+        })
+    }
+
+    /// Says what this scene and these settings do not call for, and what no pass renders yet.
+    fn explain_absent(&self, glinting: &[GlintMaterial], mirror_occlusion: bool, left_out: &mut Vec<LeftOut>) {
+        let mut leave = |what, why: String| left_out.push(LeftOut { what, why });
+        if glinting.is_empty() {
+            leave("glints", "no material glints (glint_count is absent or 0 everywhere)".to_owned());
+        }
+        if !self.environment.present() {
+            leave("environment", "the scene has none".to_owned());
+        }
+        if !mirror_occlusion {
+            leave("occlusion", "no method in use asks for it".to_owned());
+        } else if self.occlusion == OcclusionBackend::None {
+            leave("occlusion", "occlusion is off".to_owned());
+        }
+        for (what, why) in unrendered(&self.scene) {
+            leave(what, why);
+        }
+    }
+
+    /// The mean of this frame and those before it, if it is not the only one.
+    fn accumulate(&mut self, g: &mut Graph, frame: &Buffer, radiance: Image, earlier: Option<u32>) -> Image {
+        let Some(earlier) = earlier else {
+            self.mean = None;
+            return radiance;
+        };
+        let desc = ImageDesc::new(Format::Rgba32Float, radiance.extent());
+        let (mean, earlier) = match self.mean.take() {
+            Some(mean) if mean.desc() == desc => (mean, earlier),
+            _ => (Image::new("mean", desc, Lifetime::Settings), 0),
+        };
+        let mean = self.mean.insert(mean);
+        g.because("several samples a pixel");
+        passes::accumulate::accumulate(g, frame, &radiance, mean, earlier);
+        let mut shown = g.image("radiance", Format::Rgba32Float, radiance.extent());
+        g.copy_image(mean, &mut shown);
+        shown
+    }
+
+    fn upload_frame(&self, g: &mut Graph, view: &View) -> Buffer {
+        let (sin, cos) = self.rotation_radians.sin_cos();
+        let constants = types::Frame {
+            // Directions of the scene are turned back into the map's.
+            environment: [cos as f32, sin as f32, 1.0, 0.0],
+            light_count: self.buffers.light_count,
+            has_environment: u32::from(self.environment.present()),
+            ..view.frame(self.buffers.center)
+        };
+        let mut frame = g.buffer("frame", size_of::<types::Frame>() as u64);
+        g.upload(&mut frame, Arc::<[u8]>::from(bytemuck::bytes_of(&constants)));
+        frame
+    }
+}
+
+/// What the scene has that no pass renders yet.
+fn unrendered(scene: &Scene) -> Vec<(&'static str, String)> {
+    let mut found = Vec::new();
+    for Material { name, sheen, clearcoat, alpha, .. } in &scene.materials {
+        if sheen.is_some() {
+            found.push(("sheen", format!("no pass renders that of material {name} yet")));
+        }
+        if clearcoat.is_some_and(|coat| coat.normal_texture.is_some()) {
+            found.push(("clear coat normal map", format!("the coat of material {name} follows the base's normal yet")));
+        }
+        match alpha {
+            AlphaMode::Opaque => {}
+            AlphaMode::Mask { .. } => {
+                found.push(("holes in shadows", format!("material {name} blocks rays with whole triangles yet")));
+            }
+            AlphaMode::Blend => {
+                let why = format!("material {name} is shown where its alpha is at least 0.5, and nowhere else, yet");
+                found.push(("alpha blending", why));
+            }
+        }
+    }
+    found
+}
+
+/// Whether there is anything to glint: at least one flake in a square of texture space.
+fn glints(material: &GlintMaterial) -> bool {
+    material.values.number("count").round() > 0.0
+}
+
+/// The scene's glinting materials, with the settings that its file gives them.
+fn glint_materials(scene: &Scene) -> Vec<GlintMaterial> {
+    let with_glints = scene.materials.iter().enumerate().filter_map(|(index, material)| {
+        let glint = material.glint.as_ref()?;
+        let asked = glint.method.as_deref().unwrap_or(DEFAULT_METHOD);
+        let info = methods::method(asked).unwrap_or_else(|error| {
+            log::warn!("material {}: {error}: {DEFAULT_METHOD} renders it", material.name);
+            &methods::METHODS[methods::METHODS.len() - 1]
+        });
+        let mut values = info.values();
+        let [r, g, b, _] = material.base_color;
+        for (key, value) in [
+            ("count", Value::Number(glint.count)),
+            ("alpha", Value::Number(glint.alpha)),
+            ("gamma_deg", Value::Number(glint.gamma_deg)),
+            ("seed", Value::Number(f64::from(glint.seed))),
+            ("uv_scale", Value::Number(f64::from(glint.uv_scale))),
+            ("color", Value::Color(glint.color.unwrap_or([r, g, b]).map(|part| part.clamp(0.0, 1.0)))),
+        ] {
+            values.set(key, value);
+        }
+        Some(GlintMaterial { index, name: material.name.clone(), method: info, values, uv_set: glint.uv_set })
+    });
+    with_glints.collect()
+}
