@@ -1,0 +1,306 @@
+//! The command line: what may be typed, and what it means.
+
+use crate::change::Change;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use glam::DVec3;
+use mica_render::scene::Light;
+use std::path::PathBuf;
+
+/// Render, measure and explain glints, without a window.
+#[derive(Debug, Parser)]
+#[command(
+    name = "mica",
+    version,
+    args_override_self = true,
+    after_help = "Exit codes: 0 done; 2 bad input or usage; 3 no usable device or driver; 4 out of memory or device \
+                  lost; 130 interrupted, with what was finished kept."
+)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render a scene, and say what each pass costs.
+    Render(RenderArgs),
+    /// List the embedded scenes and environments.
+    Scenes(JsonFlag),
+    /// List the methods, with their settings.
+    Methods(JsonFlag),
+    /// Print the plan of a frame: its passes, what they read and write, and what was left out.
+    Explain(ExplainArgs),
+    /// Say whether this machine can render, and what is missing if not.
+    Doctor(DoctorArgs),
+}
+
+/// For commands that print little.
+#[derive(Debug, Args)]
+pub struct JsonFlag {
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A scene, and how it is rendered.
+#[derive(Debug, Args)]
+pub struct SceneArgs {
+    /// An embedded scene (see `mica scenes`) or a .gltf or .glb file.
+    #[arg(default_value = "shoe")]
+    pub scene: PathBuf,
+    /// Size of the picture in pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size, allow_hyphen_values = true)]
+    pub size: [u32; 2],
+    /// How glints are estimated, for all glinting materials (see `mica methods`). Default: what the scene says, or else
+    /// wang2020.
+    #[arg(long, value_name = "NAME")]
+    pub method: Option<String>,
+    /// A setting of all glinting materials (repeatable; see `mica methods`).
+    #[arg(long, value_name = "KEY=VALUE", value_parser = Change::of_all)]
+    pub set: Vec<Change>,
+    /// A setting of one glinting material (repeatable).
+    #[arg(long, value_name = "MATERIAL:KEY=VALUE", value_parser = Change::of_one)]
+    pub glint: Vec<Change>,
+    /// Light from everywhere: an equirectangular .exr or .hdr file, a name (see `mica scenes`), `none`, or
+    /// `constant:R,G,B`. Default: the scene's own; without one, `overcast` if there are no lights either, else `none`.
+    #[arg(long, value_name = "FILE|NAME|none|constant:R,G,B")]
+    pub env: Option<PathBuf>,
+    /// Turns the environment about +Y, counter-clockwise seen from above.
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = finite, allow_hyphen_values = true)]
+    pub env_rotate: f64,
+    /// A light beside the scene's own (repeatable): metres and W/sr, or the direction in which it travels and W/m2.
+    #[arg(long, value_name = "point:X,Y,Z,R,G,B|dir:X,Y,Z,R,G,B", value_parser = light)]
+    pub light: Vec<Light>,
+    /// Drops the scene's own lights.
+    #[arg(long)]
+    pub no_lights: bool,
+    /// Where to look from, as EYE:TARGET:FOV_DEG, the field of view from bottom to top. Default: the scene's first
+    /// camera, or one that sees all of it.
+    #[arg(long, value_name = "X,Y,Z:X,Y,Z:F", value_parser = camera, allow_hyphen_values = true)]
+    pub camera: Option<CameraChoice>,
+    /// Factor of the radiance before tone mapping, in stops.
+    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, allow_hyphen_values = true)]
+    pub exposure: f64,
+    /// Who answers whether something lies between two points; `auto` is `bvh` in this build.
+    #[arg(long, value_enum, default_value_t = OcclusionChoice::Auto)]
+    pub occlusion: OcclusionChoice,
+    /// A device, by a part of its name or its number (see `mica doctor`). Default: the best there is.
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub device: Option<String>,
+    /// Most device memory to take. Default: all of it; on a CPU device, three quarters of what is free.
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(16..=1 << 30))]
+    pub memory: Option<u64>,
+    /// Runs under Vulkan's validation layer and prints what it says.
+    #[arg(long)]
+    pub validation: bool,
+    /// Keeps tables and pipelines there. Default: `mica` in the user's cache folder.
+    #[arg(long, value_name = "DIR", conflicts_with = "no_cache")]
+    pub cache: Option<PathBuf>,
+    /// Keeps nothing and uses nothing that was kept.
+    #[arg(long)]
+    pub no_cache: bool,
+}
+
+/// `mica render`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Two runs of the same command give the same bytes in every .exr and .png, so these hold no times: \
+                        an .exr says scene, method, settings, camera, environment, lights, samples and device in its \
+                        attributes; times are in the table and in --json."
+)]
+pub struct RenderArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Where the picture goes (repeatable): .exr holds linear, scene-referred radiance in 32-bit floats, .png is
+    /// tone-mapped. Without it, frames are only timed.
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Vec<PathBuf>,
+    /// Frames that are measured for each kind of timing, after those that warm up; 0 measures nothing.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    pub frames: u32,
+    /// Samples of each pixel, averaged.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub samples: u32,
+    /// What is measured: `isolated` times each pass with a barrier around it, `overlapped` the frame as it really runs.
+    /// Default: both, in frames of their own.
+    #[arg(long, value_enum)]
+    pub timing: Option<TimingChoice>,
+    /// After the first frame, changes a setting and renders a frame (repeatable); the report says what each change made
+    /// anew. All else that is reported, and the picture, are of the last state.
+    #[arg(long, value_name = "[MATERIAL:]KEY=VALUE", value_parser = Change::of_any)]
+    pub edit: Vec<Change>,
+    /// Writes the report as JSON; `-` is stdout, in place of the table.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Prints neither table nor progress.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// `mica explain`.
+#[derive(Debug, Args)]
+pub struct ExplainArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mica doctor`.
+#[derive(Debug, Args)]
+pub struct DoctorArgs {
+    /// The device to try, by a part of its name or its number. Default: the best there is.
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub device: Option<String>,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Who answers questions about occlusion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum OcclusionChoice {
+    Auto,
+    RayQuery,
+    Bvh,
+    None,
+}
+
+/// What is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TimingChoice {
+    Isolated,
+    Overlapped,
+}
+
+/// Where to look from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraChoice {
+    /// Metres.
+    pub eye: DVec3,
+    /// Metres; not at the eye.
+    pub target: DVec3,
+    /// From bottom to top, within 0 and 180.
+    pub vertical_fov_deg: f64,
+}
+
+/// Most pixels along a side: what every device with Vulkan 1.3 can be expected to stop at.
+const LARGEST_SIDE: u32 = 16384;
+/// Coordinates beyond this are meaningless in metres, and their squares leave f32.
+const LARGEST_COORDINATE: f64 = 1e9;
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let wanted = || format!("expected WIDTHxHEIGHT, each 1 to {LARGEST_SIDE}, such as 1920x1080");
+    let (width, height) = text.split_once(['x', 'X']).ok_or_else(wanted)?;
+    let side = |text: &str| text.parse().ok().filter(|side| (1..=LARGEST_SIDE).contains(side)).ok_or_else(wanted);
+    Ok([side(width)?, side(height)?])
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    text.trim().parse().ok().filter(|number: &f64| number.is_finite()).ok_or_else(|| "expected a finite number".into())
+}
+
+fn exposure(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|stops| stops.abs() <= 32.0).ok_or_else(|| "expected stops from -32 to 32".into())
+}
+
+/// So many finite numbers between commas.
+pub fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let numbers: Vec<f64> = text.split(',').map(finite).collect::<Result<_, _>>().ok()?;
+    numbers.try_into().ok()
+}
+
+fn point(text: &str) -> Option<DVec3> {
+    numbers::<3>(text).map(DVec3::from).filter(|point| point.abs().max_element() <= LARGEST_COORDINATE)
+}
+
+/// A radiance, intensity or irradiance: three numbers that are not negative and fit an f32 with room for sums.
+pub fn power(rgb: [f64; 3]) -> Option<[f32; 3]> {
+    rgb.iter().all(|channel| (0.0..=1e12).contains(channel)).then(|| rgb.map(|channel| channel as f32))
+}
+
+fn light(text: &str) -> Result<Light, String> {
+    let wanted = || "expected point:X,Y,Z,R,G,B or dir:X,Y,Z,R,G,B, with R, G and B from 0 to 1e12".to_owned();
+    let (kind, rest) = text.split_once(':').ok_or_else(wanted)?;
+    let [x, y, z, r, g, b] = numbers(rest).ok_or_else(wanted)?;
+    let power = power([r, g, b]).ok_or_else(wanted)?;
+    let place = DVec3::new(x, y, z);
+    if place.abs().max_element() > LARGEST_COORDINATE {
+        return Err(format!("expected coordinates up to {LARGEST_COORDINATE:e}"));
+    }
+    match kind {
+        "point" => Ok(Light::Point { position: place, radiant_intensity: power, range: None }),
+        "dir" => {
+            let direction =
+                place.try_normalize().ok_or("expected the direction in which the light travels, not 0,0,0")?;
+            Ok(Light::Directional { direction, irradiance: power })
+        }
+        _ => Err(wanted()),
+    }
+}
+
+fn camera(text: &str) -> Result<CameraChoice, String> {
+    let parts: Vec<&str> = text.split(':').collect();
+    let [eye, target, fov] = parts[..] else { return Err("expected EYE:TARGET:FOV_DEG, as X,Y,Z:X,Y,Z:F".into()) };
+    let eye = point(eye).ok_or("EYE: expected three numbers X,Y,Z, in metres")?;
+    let target = point(target).ok_or("TARGET: expected three numbers X,Y,Z, in metres")?;
+    let vertical_fov_deg = finite(fov)
+        .ok()
+        .filter(|degrees| (0.01..=179.0).contains(degrees))
+        .ok_or("FOV_DEG: expected degrees from 0.01 to 179")?;
+    if (target - eye).try_normalize().is_none() {
+        return Err("EYE and TARGET are one point; expected two".into());
+    }
+    Ok(CameraChoice { eye, target, vertical_fov_deg })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_have_two_sides_of_at_least_a_pixel() {
+        assert_eq!(size("1920x1080"), Ok([1920, 1080]));
+        for bad in ["", "x", "0x0", "5x0", "-1x4", "1e3x4", "640", "640x480x1", "16385x1", "99999999999x1", " 4x4"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn cameras_look_somewhere() {
+        let camera = camera("-1,2,3.5:0,0,0:40").expect("a camera");
+        assert_eq!((camera.eye, camera.vertical_fov_deg), (DVec3::new(-1.0, 2.0, 3.5), 40.0));
+        for bad in
+            ["", "0,0,0", "0,0,0:0,0,0:40", "1,0,0:0,0:40", "NaN,0,0:0,0,0:40", "1,0,0:0,0,0:180", "inf,0,0:1,1,1:4"]
+        {
+            assert!(super::camera(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn lights_have_a_kind_a_place_and_a_power() {
+        let Ok(Light::Directional { direction, irradiance }) = light("dir:0,-2,0,1,2,3") else { panic!("no light") };
+        assert_eq!((direction, irradiance), (DVec3::NEG_Y, [1.0, 2.0, 3.0]));
+        assert!(matches!(light("point:0,1,0,4,4,4"), Ok(Light::Point { .. })));
+        for bad in [
+            "",
+            "point",
+            "spot:0,0,0,1,1,1",
+            "dir:0,0,0,1,1,1",
+            "point:0,0,0,1,1",
+            "point:0,0,0,-1,1,1",
+            "point:0,nan,0,1,1,1",
+        ] {
+            assert!(light(bad).is_err(), "{bad}");
+        }
+    }
+}

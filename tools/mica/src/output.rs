@@ -1,0 +1,155 @@
+//! Where results go: stdout, and files that are written whole or not at all.
+
+use crate::error::Failure;
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Prints to stdout. A reader that has seen enough is no failure.
+pub fn print(text: &str) -> Result<(), Failure> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::bad_input(format!("stdout cannot be written: {error}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Prints a report as indented JSON.
+pub fn print_json(report: &impl serde::Serialize) -> Result<(), Failure> {
+    print(&(json(report)? + "\n"))
+}
+
+/// A report as indented JSON.
+pub fn json(report: &impl serde::Serialize) -> Result<String, Failure> {
+    serde_json::to_string_pretty(report).map_err(|error| Failure::bad_input(format!("the report is no JSON: {error}")))
+}
+
+/// A file to be written, that could be written when it was checked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Destination {
+    /// As the user gave it.
+    pub path: PathBuf,
+    /// The file that a rename is to replace, symbolic links followed; none where the path leads to a device or a pipe,
+    /// which is written into.
+    replaced: Option<PathBuf>,
+}
+
+impl Destination {
+    /// Checks, before any work is done, that the file can be written; leaves the old one as it is.
+    pub fn check(path: &Path) -> Result<Self, Failure> {
+        let failed = |why: &str| Failure::bad_input(format!("{}: {why}", path.display()));
+        let replaced = match fs::metadata(path) {
+            Ok(found) if found.is_dir() => return Err(failed("is a folder; name a file in it")),
+            Ok(found) if found.is_file() => Some(path.canonicalize().map_err(|error| failed(&error.to_string()))?),
+            Ok(_) => None,
+            Err(error) if error.kind() == ErrorKind::NotFound => Some(path.to_owned()),
+            Err(error) => return Err(failed(&error.to_string())),
+        };
+        if let Some(replaced) = &replaced {
+            if replaced.file_name().is_none() {
+                return Err(failed("names no file"));
+            }
+            let folder = folder_of(replaced);
+            if !folder.is_dir() {
+                return Err(failed(&format!("there is no folder {}; make it first", folder.display())));
+            }
+            let probe = temporary_beside(replaced);
+            File::create_new(&probe)
+                .and_then(|_| fs::remove_file(&probe))
+                .map_err(|error| failed(&format!("its folder cannot be written: {error}")))?;
+        }
+        Ok(Self { path: path.to_owned(), replaced })
+    }
+
+    /// Writes the file: under another name first, which then takes its place once every byte is on the disk.
+    pub fn write(&self, bytes: &[u8]) -> Result<(), Failure> {
+        let written = match &self.replaced {
+            Some(replaced) => replace(replaced, bytes),
+            None => File::options().write(true).open(&self.path).and_then(|mut file| file.write_all(bytes)),
+        };
+        written.map_err(|error| Failure::bad_input(format!("{} cannot be written: {error}", self.path.display())))
+    }
+}
+
+fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let temporary = temporary_beside(path);
+    let written = File::create_new(&temporary)
+        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
+        .and_then(|()| fs::rename(&temporary, path));
+    match written {
+        Ok(()) => {
+            // The folder too, so that a crash does not bring the old file back. Not every file system can.
+            let _ = File::open(folder_of(path)).and_then(|folder| folder.sync_all());
+            Ok(())
+        }
+        Err(error) => {
+            let _ = fs::remove_file(&temporary);
+            Err(error)
+        }
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// A name that nobody uses, in the same folder: only there a rename is atomic.
+fn temporary_beside(path: &Path) -> PathBuf {
+    static NEXT: AtomicU32 = AtomicU32::new(0);
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    folder_of(path).join(format!(".mica-{}-{number}.tmp", std::process::id()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).expect("a folder");
+        entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect()
+    }
+
+    #[test]
+    fn a_check_leaves_nothing_and_changes_nothing() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("a.json");
+        assert!(Destination::check(&path).is_ok());
+        assert_eq!(names(folder.path()), Vec::<String>::new());
+        fs::write(&path, "old").expect("a file");
+        Destination::check(&path).expect("a destination").write(b"new").expect("written");
+        assert_eq!((names(folder.path()), fs::read(&path).ok()), (vec!["a.json".to_owned()], Some(b"new".to_vec())));
+    }
+
+    #[test]
+    fn a_link_stays_a_link_to_what_was_replaced() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        fs::write(&file, "old").expect("a file");
+        std::os::unix::fs::symlink("file", &link).expect("a link");
+        Destination::check(&link).expect("a destination").write(b"new").expect("written");
+        assert_eq!(fs::read(&file).ok(), Some(b"new".to_vec()));
+        assert!(link.is_symlink());
+    }
+
+    #[test]
+    fn what_cannot_be_a_file_is_refused_before_any_work() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let file = folder.path().join("file");
+        fs::write(&file, "x").expect("a file");
+        let long = folder.path().join("x".repeat(300));
+        for bad in
+            [folder.path(), &folder.path().join("missing/a"), &file.join("a"), &long, Path::new(""), Path::new("..")]
+        {
+            assert!(Destination::check(bad).is_err(), "{}", bad.display());
+        }
+    }
+
+    #[test]
+    fn a_full_device_is_seen_and_not_replaced() {
+        let full = Destination::check(Path::new("/dev/full")).expect("a device can be written into");
+        assert!(full.write(b"x").is_err_and(|failure| failure.to_string().contains("/dev/full")));
+    }
+}

@@ -1,0 +1,76 @@
+//! The scene that was asked for: embedded, or a file.
+
+use crate::error::Failure;
+use crate::progress::Progress;
+use mica_render::scene::{Scene, SceneError};
+use mica_render::{EMBEDDED_SCENES, embedded_scene};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+
+/// Name of the thread that reads what the user gave.
+pub const LOADER: &str = "loader";
+
+/// A scene, and where it came from.
+pub struct ChosenScene {
+    /// As it was asked for.
+    pub name: String,
+    /// The folder of its file; none for embedded scenes.
+    pub folder: Option<PathBuf>,
+    /// The scene itself.
+    pub scene: Scene,
+}
+
+/// Loads the embedded scene of that name, or else the file.
+pub fn load(choice: &Path, progress: &mut Progress) -> Result<ChosenScene, Failure> {
+    let name = choice.display().to_string();
+    if let Some(embedded) = choice.to_str().and_then(embedded_scene) {
+        let scene = on_loader(&name, progress, || embedded.load())?;
+        return Ok(ChosenScene { name, folder: None, scene });
+    }
+    if choice.extension().is_none() && !choice.exists() {
+        let known: Vec<&str> = EMBEDDED_SCENES.iter().map(|scene| scene.name).collect();
+        let known = known.join(", ");
+        return Err(Failure::bad_input(format!(
+            "no scene `{name}`: embedded are {known}; or give the path of a .gltf or .glb file"
+        )));
+    }
+    let path = choice.to_owned();
+    let folder = path.parent().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
+    let folder = folder.map(Path::to_owned);
+    let scene = on_loader(&name, progress, move || Scene::load(&path))?;
+    Ok(ChosenScene { name, folder, scene })
+}
+
+/// Reads something on a thread of its own: progress is shown meanwhile, and a panic there is an error here.
+pub fn on_loader<T: Send + 'static>(
+    what: &str,
+    progress: &mut Progress,
+    read: impl FnOnce() -> Result<T, SceneError> + Send + 'static,
+) -> Result<T, Failure> {
+    let (to, from) = mpsc::channel();
+    let thread = std::thread::Builder::new().name(LOADER.to_owned()).spawn(move || {
+        // The receiver waits as long as this thread lives.
+        let _ = to.send(read());
+    });
+    if let Err(error) = thread {
+        return Err(Failure::bad_input(format!("{what}: no thread to read it on: {error}")));
+    }
+    match progress.wait(&format!("reading {what}"), from) {
+        Some(result) => Ok(result?),
+        None => Err(Failure::bad_input(format!(
+            "{what}: the loader gave up on it (run with RUST_LOG=debug for details); check the file, and report it if \
+             other programs read it"
+        ))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_of_the_loader_is_a_failure() {
+        let result = on_loader("x.glb", &mut Progress::new(true), || -> Result<(), SceneError> { panic!("a bug") });
+        assert!(result.is_err_and(|failure| failure.code == crate::error::BAD_INPUT));
+    }
+}

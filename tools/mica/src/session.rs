@@ -1,0 +1,237 @@
+//! A scene on a device, set up as the command line says, and the frames that are made of it.
+
+use crate::args::{CameraChoice, OcclusionChoice, SceneArgs};
+use crate::environment_choice;
+use crate::error::Failure;
+use crate::picture::Picture;
+use crate::progress::Progress;
+use crate::scene_choice::{self, ChosenScene};
+use mica_gpu::{Device, DeviceInfo, DeviceKind, DeviceOptions, Executor, ExecutorOptions, Run, Timing};
+use mica_graph::{Graph, Plan};
+use mica_render::scene::Camera;
+use mica_render::{Cache, Frame, LeftOut, OcclusionBackend, Renderer, Update, View, method};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// A scene on a device.
+pub struct Session {
+    /// The scene, as it was asked for.
+    pub scene: String,
+    /// The environment: name, path, `constant:R,G,B` or `none`.
+    pub environment: String,
+    /// How far it is turned, in degrees.
+    pub environment_rotation_deg: f64,
+    /// The scene, prepared.
+    pub renderer: Renderer,
+    /// What runs its frames.
+    pub executor: Executor,
+    /// What they show.
+    pub view: View,
+    cache: Option<Cache>,
+    asked_method: Option<String>,
+}
+
+/// A finished frame.
+pub struct Shot {
+    /// What was executed, and how long it took.
+    pub run: Run,
+    /// For each pass of the plan, whether it brought a table up to date.
+    pub is_update: Vec<bool>,
+    /// What the frame did without.
+    pub left_out: Vec<LeftOut>,
+    /// The picture, where it was wanted.
+    pub picture: Option<Picture>,
+}
+
+/// A frame that was declared and not executed.
+pub struct Declared {
+    /// Its passes.
+    pub graph: Graph,
+    /// Name and reason of each.
+    passes: Vec<(String, String)>,
+    frame: Frame,
+}
+
+impl Declared {
+    /// What the frame does without.
+    pub fn left_out(&self) -> &[LeftOut] {
+        &self.frame.left_out
+    }
+
+    /// For each pass that a plan of this frame kept, in order, whether it brings a table up to date.
+    pub fn updates_of(&self) -> impl Fn(&Plan) -> Vec<bool> + use<> {
+        let (declared, updates) = (self.passes.clone(), self.frame.updates.clone());
+        move |plan| {
+            let mut next = 0;
+            let mut is_update = Vec::with_capacity(plan.passes.len());
+            for pass in &plan.passes {
+                // Planning leaves passes out and keeps the order of the others; what was appended later is no update.
+                let same = |(name, why): &(String, String)| *name == pass.name && *why == pass.why;
+                let found = declared[next..].iter().position(same).map(|skipped| next + skipped);
+                is_update.push(found.is_some_and(|index| updates.contains(&index)));
+                next = found.map_or(next, |index| index + 1);
+            }
+            is_update
+        }
+    }
+}
+
+impl Session {
+    /// Loads the scene, finds a device, and applies all settings. No frame is made yet.
+    pub fn new(args: &SceneArgs, progress: &mut Progress) -> Result<Self, Failure> {
+        let occlusion = occlusion(args.occlusion)?;
+        if let Some(name) = &args.method {
+            method(name)?;
+        }
+        let mut chosen = scene_choice::load(&args.scene, progress)?;
+        if args.no_lights {
+            chosen.scene.lights.clear();
+        }
+        let has_lights = !(chosen.scene.lights.is_empty() && args.light.is_empty());
+        let environment =
+            environment_choice::choose(args.env.as_deref(), args.env_rotate, &chosen, has_lights, progress)?;
+        progress.clear();
+        let camera = args.camera.map_or_else(|| chosen.scene.default_camera(), camera);
+        let exposure = args.exposure.exp2() as f32;
+        let view = View { exposure, ..View::new(camera, args.size) };
+
+        let ChosenScene { name, scene, .. } = chosen;
+        let mut renderer = Renderer::new(scene, &args.light, environment.environment.as_ref(), occlusion)?;
+        for change in args.set.iter().chain(&args.glint) {
+            change.check(renderer.materials())?;
+        }
+        if let Some(name) = &args.method {
+            renderer.set_method(None, name)?;
+        }
+        for change in args.set.iter().chain(&args.glint) {
+            change.apply(&mut renderer)?;
+        }
+        if renderer.materials().is_empty() && !(args.set.is_empty() && args.method.is_none()) {
+            log::warn!("{name}: no material glints (none has glint_count in its extras): settings have no effect");
+        }
+
+        let device = Device::new(&DeviceOptions { select: args.device.clone(), validation: args.validation })?;
+        check_size(args.size, device.info())?;
+        let cache = match (&args.cache, args.no_cache) {
+            (_, true) => None,
+            (Some(folder), false) => Some(Cache::new(folder)),
+            (None, false) => Cache::of_user(),
+        };
+        let executor = executor(device, cache.as_ref(), args.memory)?;
+        Ok(Self {
+            scene: name,
+            environment: environment.name,
+            environment_rotation_deg: args.env_rotate,
+            renderer,
+            executor,
+            view,
+            cache,
+            asked_method: args.method.clone(),
+        })
+    }
+
+    /// The device.
+    pub fn device(&self) -> &DeviceInfo {
+        self.executor.device().info()
+    }
+
+    /// The names of the methods in use, or of the one that would be.
+    pub fn method(&self) -> String {
+        let mut names: Vec<&str> = self.renderer.materials().iter().map(|material| material.method.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        match (names.is_empty(), &self.asked_method) {
+            (false, _) => names.join("+"),
+            (true, Some(asked)) => asked.clone(),
+            (true, None) => mica_render::DEFAULT_METHOD.to_owned(),
+        }
+    }
+
+    /// Makes the tables that take too long for a frame, or takes them from the cache.
+    pub fn precompute(&mut self, progress: &mut Progress) -> Result<Vec<Update>, Failure> {
+        let mut show = |what: &str, done, total| progress.update(what, done, total);
+        let updates = self.renderer.precompute(&mut self.executor, self.cache.as_ref(), &mut show)?;
+        progress.clear();
+        Ok(updates)
+    }
+
+    /// Declares a frame. With `sample`, it shows the mean of itself and the samples before it.
+    pub fn declare(&mut self, sample: Option<u32>) -> Result<Declared, Failure> {
+        let mut graph = Graph::new();
+        let view = sample.map_or_else(|| self.view.clone(), |sample| self.view.sample(sample));
+        let frame = self.renderer.frame(&mut graph, &view, sample)?;
+        graph.export(&frame.display);
+        let passes = graph.passes().iter().map(|pass| (pass.name.clone(), pass.why.clone())).collect();
+        Ok(Declared { graph, passes, frame })
+    }
+
+    /// Makes a frame, and brings its picture back if `picture` says so.
+    pub fn frame(&mut self, sample: Option<u32>, timing: Timing, picture: bool) -> Result<Shot, Failure> {
+        let mut declared = self.declare(sample)?;
+        let updates_of = declared.updates_of();
+        let Declared { graph: g, frame, .. } = &mut declared;
+        let downloads = picture.then(|| (g.download_image(&frame.radiance), g.download_image(&frame.display)));
+        let mut run = self.executor.run(std::mem::take(g), timing)?;
+        let picture = downloads.map(|(radiance, display)| Picture {
+            size: self.view.size,
+            radiance: floats(&run.take(radiance)),
+            display: run.take(display),
+        });
+        let is_update = updates_of(&run.plan);
+        Ok(Shot { is_update, run, left_out: declared.frame.left_out, picture })
+    }
+}
+
+/// 32-bit floats as the device stores them.
+fn floats(bytes: &[u8]) -> Vec<f32> {
+    bytes.as_chunks().0.iter().map(|word| f32::from_ne_bytes(*word)).collect()
+}
+
+fn occlusion(choice: OcclusionChoice) -> Result<OcclusionBackend, Failure> {
+    match choice {
+        OcclusionChoice::Auto | OcclusionChoice::Bvh => Ok(OcclusionBackend::Bvh),
+        OcclusionChoice::None => Ok(OcclusionBackend::None),
+        OcclusionChoice::RayQuery => Err(Failure::bad_input(
+            "--occlusion ray-query: this build has no ray-query body yet; use bvh, which runs on every device",
+        )),
+    }
+}
+
+fn camera(choice: CameraChoice) -> Camera {
+    let CameraChoice { eye, target, vertical_fov_deg } = choice;
+    // Depth is reversed and a float, so a near plane this close costs nothing.
+    let near = 1e-6 * eye.distance(target).min(100.0);
+    Camera::looking_at("command line", eye, target, vertical_fov_deg.to_radians(), near)
+}
+
+fn check_size(size: [u32; 2], device: &DeviceInfo) -> Result<(), Failure> {
+    let most = device.limits.max_image_side_2d;
+    if size.into_iter().all(|side| side <= most) {
+        return Ok(());
+    }
+    let [width, height] = size;
+    Err(Failure::bad_input(format!("--size {width}x{height}: {} holds images of {most} pixels a side", device.name)))
+}
+
+fn executor(device: Arc<Device>, cache: Option<&Cache>, memory_mebibytes: Option<u64>) -> Result<Executor, Failure> {
+    let name: String = device.info().name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+    let pipeline_cache = cache.map(|cache| cache.folder().join(format!("pipelines-{name}.bin")));
+    let mut options = ExecutorOptions { pipeline_cache, ..Default::default() };
+    if device.info().kind == DeviceKind::Cpu {
+        // A driver on the processor grants more than there is, and the system then ends the process: stop before that.
+        options.memory_limit_bytes = available_memory_bytes().map(|bytes| bytes / 4 * 3);
+        // It does not hang either: it is slow, and large tables take minutes.
+        options.timeout = Duration::from_secs(3600);
+    }
+    if let Some(mebibytes) = memory_mebibytes {
+        options.memory_limit_bytes = Some(mebibytes << 20);
+    }
+    Ok(Executor::with_options(device, options)?)
+}
+
+/// What Linux could give to a process without swapping.
+fn available_memory_bytes() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    line.trim().strip_suffix(" kB")?.parse::<u64>().ok().map(|kibibytes| kibibytes * 1024)
+}
