@@ -1,0 +1,11 @@
+//! The whole program against the oracle and against its claims, under validation and synchronisation validation.
+
+mod borrowed;
+mod foreign_models;
+mod frames;
+mod occlusion;
+mod orientation;
+mod smooth;
+mod wang2020_quadtree;
+mod wang2020_shading;
+mod wang2020_tables;
