@@ -71,7 +71,7 @@ fn a_turned_environment_is_a_map_with_its_columns_moved() {
     }
 }
 
-/// A texture of one colour but for what `texel` makes of its place.
+/// A square texture, from what each place in it holds.
 fn texture(encoding: Encoding, side: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Texture {
     let pixels = (0..side).flat_map(|y| (0..side).map(move |x| (x, y))).flat_map(|(x, y)| texel(x, y));
     Texture {
@@ -89,7 +89,7 @@ fn texture_of_set(uv_set: u32) -> TextureRef {
     TextureRef { texture: 0, uv_set, transform: TextureRef::IDENTITY }
 }
 
-/// The unit sphere without a quarter of its bands' quadrangles, so that its inner side is in view, bumpy and grey.
+/// The unit sphere, bumpy and grey, with a hole through which its inner side is in view.
 fn open_sphere(double_sided: bool) -> Scene {
     let material = Material {
         base_color: [0.5, 0.5, 0.5, 1.0],
@@ -270,8 +270,8 @@ fn textures_and_flakes_lie_in_the_set_they_name() {
     let materials: [(&str, &dyn Fn(u32) -> Material); 2] = [("texture", &textured), ("flakes", &glinting)];
     for (what, material) in materials {
         let with_texture = |scene: Scene| Scene {
-            textures: vec![texture(Encoding::Srgb, 8, |x, y| {
-                [32 * x as u8, 32 * y as u8, 99, if x == y { 0 } else { 255 }]
+            textures: vec![texture(Encoding::Srgb, 64, |x, y| {
+                [4 * x as u8, 4 * y as u8, 99, if x / 8 == y / 8 { 0 } else { 255 }]
             })],
             ..scene
         };

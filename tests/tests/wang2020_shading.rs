@@ -218,8 +218,9 @@ fn gamma_spreads_light_without_adding_any() {
     }
 }
 
-/// The 36 x 9 directions of Eq. 17 all miss the narrowest lobe, so that P-hat is 0 there: the scales that do not test
-/// flakes one by one do without it. Catches a division by P-hat, or a test of it, at those scales.
+/// The 36 x 9 directions of Eq. 17 all miss the narrowest lobe when it is seen head-on, so that P-hat is next to nothing:
+/// flakes tested one by one are all out, as published, but the two scales that do not test them need no P-hat. Catches
+/// its use there.
 #[test]
 fn the_narrowest_lobe_is_not_black() {
     let mut gpu = Gpu::new();
@@ -232,6 +233,7 @@ fn the_narrowest_lobe_is_not_black() {
         renderer.set(None, "macro", macro_).expect("a setting");
         gpu.render(&mut renderer, &head_on.view(SIZE)).picture
     });
+    assert_eq!(micro.mean(), [0.0; 3], "no flake has so small a lambda");
     println!("macro {:?}, meso {:?}, micro {:?}", macro_.mean(), meso.mean(), micro.mean());
     assert!(meso.variance() > macro_.variance(), "the flakes of each pixel are counted");
     for (scale, picture) in [("macro", macro_), ("meso", meso)] {

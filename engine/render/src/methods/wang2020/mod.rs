@@ -5,6 +5,7 @@
 //! - 64 directions drawn from the BRDF stand for the whole environment: a sun in the map is missed by most of them, and
 //!   hardly lights (give it to the scene as a light);
 //! - Eq. 17 makes P-hat a solid angle that does not know the light: a white furnace sparkles;
+//! - the 36 x 9 directions of Eq. 17 miss narrow lobes (alpha .02 seen head-on): no flake tested one by one is lit there;
 //! - one lambda a flake: lit sets are nested, flakes with a small lambda never go out;
 //! - the scales switch at 4 and 64 flakes in the footprint: the variance jumps there;
 //! - the table is linear in alpha between eight roughnesses from .02, below which it stays at .02, and sums whole
