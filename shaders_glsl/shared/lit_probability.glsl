@@ -35,7 +35,8 @@ float erf_between(float low, float high) {
 // C h = -2 sin^2(gamma/2) h lets it be written about the slope of h without cancellation. Gauss-Legendre in the angle
 // along the long axis, error functions across it.
 //
-// Directions are unit vectors about n = +Z. Relative error at most 5e-6 for gamma up to 1.5 alpha, 1.5e-2 at 5 alpha.
+// Directions are unit vectors about n = +Z. Relative error against the f64 oracle: 1.4e-5 at worst in
+// the tests of the 1-degree tables (alpha from .02, polar angles to 80 degrees); it grows where gamma is over 1.5 alpha.
 // Where the ellipse opens (both directions within gamma of the horizon) the density at h times the cone serves.
 float lit_probability(vec3 i, vec3 o, float sin2_half_gamma, float alpha) {
   const float NODES[8] = float[](

@@ -1,6 +1,5 @@
 //! The environment on the device: the map with its levels, and the tables made from it once something needs them.
 
-use crate::RenderError;
 use crate::passes;
 use crate::scene::EquirectMap;
 use mica_graph::{Extent, Format, Graph, Image, ImageDesc, Lifetime};
@@ -45,13 +44,11 @@ pub(crate) struct EnvironmentTables {
     irradiance_ready: bool,
     ggx: Lobe,
     ggx_ready: bool,
-    /// Changes with the map.
-    version: u64,
 }
 
 impl EnvironmentTables {
     /// The tables of a map; without one, of a single black texel that no shader reads.
-    pub fn new(map: Option<&EquirectMap>, version: u64) -> Result<Self, RenderError> {
+    pub fn new(map: Option<&EquirectMap>) -> Self {
         let black = EquirectMap { width: 1, height: 1, texels: vec![[0.0; 3]] };
         let levels = levels(map.unwrap_or(&black));
         let extent = Extent::new(levels[0].width, levels[0].height);
@@ -60,7 +57,7 @@ impl EnvironmentTables {
             levels.iter().flat_map(|level| &level.texels).map(|&[r, g, b]| [r, g, b, 1.0]).collect();
         let lobe = if map.is_some() { Lobe::new("ggx") } else { Self::absent_lobe() };
         let irradiance_extent = if map.is_some() { Extent::new(64, 32) } else { Extent::new(1, 1) };
-        Ok(Self {
+        Self {
             present: map.is_some(),
             map: Image::new("environment", desc, Lifetime::Scene),
             pending: Some(Arc::from(bytemuck::cast_slice::<_, u8>(&texels))),
@@ -72,8 +69,7 @@ impl EnvironmentTables {
             irradiance_ready: map.is_none(),
             ggx: lobe,
             ggx_ready: map.is_none(),
-            version,
-        })
+        }
     }
 
     fn absent_lobe() -> Lobe {
@@ -91,11 +87,6 @@ impl EnvironmentTables {
     /// Whether there is an environment.
     pub fn present(&self) -> bool {
         self.present
-    }
-
-    /// Changes with the map.
-    pub fn version(&self) -> u64 {
-        self.version
     }
 
     /// The map with its levels.

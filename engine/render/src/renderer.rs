@@ -109,7 +109,7 @@ impl Renderer {
         }
         let atlas = Atlas::pack(&scene.textures, AtlasLimits::default());
         let buffers = SceneBuffers::new(&scene, &all_lights, &atlas)?;
-        let environment_tables = EnvironmentTables::new(environment.map(|environment| &environment.map), 0)?;
+        let environment_tables = EnvironmentTables::new(environment.map(|environment| &environment.map));
         let materials = glint_materials(&scene);
         let one = ImageDesc::new(Format::R32Uint, Extent::new(1, 1));
         Ok(Self {

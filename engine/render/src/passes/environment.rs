@@ -6,7 +6,8 @@ use mica_shaders::{constants as c, environment_irradiance, environment_specular,
 
 /// Normals drawn for each texel of the prefiltered environment.
 const SPECULAR_SAMPLES: u32 = 64;
-/// Normals drawn for each entry of the albedo table: its worst error is then below 1e-3 beyond 80 degrees.
+/// Normals drawn for each entry of the albedo table: the tests find the means of a plane and a sphere under a constant
+/// sky within 0.07 % of the f64 evaluation.
 const ALBEDO_SAMPLES: u32 = 1024;
 
 /// Directions summed for each texel of the irradiance, along the horizon and from pole to pole.

@@ -34,7 +34,7 @@ pub struct EnvironmentReport {
 }
 
 impl EquirectMap {
-    /// The greatest radiance that is kept: a thousand suns, with room for sums of it in 32-bit floats.
+    /// The greatest radiance that is kept: sums of it stay far inside the range of a 32-bit float.
     pub const GREATEST: f32 = 1e12;
 
     /// The same radiance from everywhere.

@@ -13,8 +13,8 @@ const PREFILTER_ENTRIES: u64 =
 
 /// What an accumulated table depends on: alpha, gamma in degrees, the table it was made from.
 type AccumulatedKey = (f64, f64, DpfSource);
-/// What a prefiltered table depends on, beside that: samples, the environment.
-type PrefilteredKey = (AccumulatedKey, f64, u64);
+/// What a prefiltered table depends on, beside that: samples. The environment is a renderer's own and does not change.
+type PrefilteredKey = (AccumulatedKey, f64);
 /// What a quadtree depends on: flakes, seed, depth.
 type QuadtreeKey = (f64, f64, f64);
 
@@ -64,7 +64,7 @@ impl Tables {
         if self.accumulated_for != Some(accumulated) {
             self.accumulate(g, material, accumulated, dpf);
         }
-        let prefiltered = (accumulated, material.values.number("samples"), environment.version());
+        let prefiltered = (accumulated, material.values.number("samples"));
         if environment.present() && self.prefiltered_for != Some(prefiltered) {
             self.prefilter(g, material, prefiltered, environment);
         }
@@ -106,11 +106,10 @@ impl Tables {
         key: PrefilteredKey,
         environment: &EnvironmentTables,
     ) {
-        let (accumulated, samples, _) = key;
+        let (accumulated, samples) = key;
         let change = match self.prefiltered_for {
-            Some((before, _, _)) if before != accumulated => "P(i, o, gamma) changed",
-            Some((_, before, _)) if before != samples => "the number of samples changed",
-            Some(_) => "the environment changed",
+            Some((before, _)) if before != accumulated => "P(i, o, gamma) changed",
+            Some(_) => "the number of samples changed",
             None => "first frame under this environment",
         };
         g.because(format!("material {}: {change}", material.name));
