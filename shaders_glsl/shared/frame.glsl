@@ -13,6 +13,7 @@ layout(std140, binding = 0) uniform Frame {
   uint height; // Pixels along y.
   uint light_count; // Lights in the scene.
   uint has_environment; // 1 where there is an environment.
+  uint sample_index; // Which sample of its pixels this frame is: methods that draw directions draw others in each.
 } frame;
 
 // Direction, not normalised, of the ray through the centre of a pixel.

@@ -79,6 +79,8 @@ impl Host {
                 Feature::DynamicRendering => vulkan13.dynamic_rendering = vk::TRUE,
                 Feature::Maintenance4 => vulkan13.maintenance4 = vk::TRUE,
                 Feature::StorageImageExtendedFormats => core.shader_storage_image_extended_formats = vk::TRUE,
+                Feature::Int64 => core.shader_int64 = vk::TRUE,
+                Feature::Float64 => core.shader_float64 = vk::TRUE,
             }
         }
         assert!(MicaDevice::requirements().device_extensions.is_empty(), "this host enables none");

@@ -6,6 +6,7 @@ mod frames;
 mod occlusion;
 mod orientation;
 mod smooth;
+mod stage;
 mod wang2020_quadtree;
 mod wang2020_shading;
 mod wang2020_tables;

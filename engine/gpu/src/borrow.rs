@@ -20,7 +20,7 @@ pub struct HostDevice<'a> {
     pub api_version: Version,
     /// The family of the queue that the recorded command buffers are submitted to; graphics and compute.
     pub queue_family: u32,
-    /// Those of the features in [`Device::requirements`] that the host enabled.
+    /// Those of the features in [`Device::requirements`], needed and optional, that the host enabled.
     pub enabled: &'a [Feature],
     /// Whether the host enabled `VK_EXT_debug_utils`, for names and labels.
     pub debug_utils: bool,
@@ -64,6 +64,7 @@ impl Device {
             physical: host.physical_device,
             queue_family: host.queue_family,
             info,
+            features: host.enabled.to_vec(),
             debug_utils: host.debug_utils.then(|| ext::debug_utils::Device::new(host.instance, host.device)),
             own: None,
             lost: AtomicBool::new(false),

@@ -1,7 +1,7 @@
 //! The device that everything runs on: created here, or borrowed from a host.
 
 use crate::error::Error;
-use crate::features::{DeviceRequirements, REQUIREMENTS, to_enable};
+use crate::features::{DeviceRequirements, Feature, REQUIREMENTS, offered, to_enable};
 use crate::info::{self, DeviceInfo};
 use crate::instance::Instance;
 use crate::messages::{Message, Messages};
@@ -29,6 +29,8 @@ pub struct Device {
     pub(crate) physical: vk::PhysicalDevice,
     pub(crate) queue_family: u32,
     pub(crate) info: DeviceInfo,
+    /// Those that are enabled.
+    pub(crate) features: Vec<Feature>,
     pub(crate) debug_utils: Option<ext::debug_utils::Device>,
     /// What we made and must destroy; `None` for a borrowed device.
     pub(crate) own: Option<Own>,
@@ -59,7 +61,8 @@ impl Device {
         let priorities = [1.0];
         let queues =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&priorities)];
-        let (core, mut vulkan13) = to_enable();
+        let features = offered(&instance.raw, physical);
+        let (core, mut vulkan13) = to_enable(&features);
         let create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_features(&core)
@@ -76,6 +79,7 @@ impl Device {
             physical,
             queue_family,
             info,
+            features,
             debug_utils,
             own: Some(Own { instance, queue: Mutex::new(queue) }),
             lost: AtomicBool::new(false),
@@ -91,6 +95,11 @@ impl Device {
     /// What this device is.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
+    }
+
+    /// Whether a feature is enabled.
+    pub fn has(&self, feature: Feature) -> bool {
+        self.features.contains(&feature)
     }
 
     /// Whether the device belongs to a host.

@@ -13,6 +13,10 @@ pub enum Feature {
     Maintenance4,
     /// `VkPhysicalDeviceFeatures::shaderStorageImageExtendedFormats`.
     StorageImageExtendedFormats,
+    /// `VkPhysicalDeviceFeatures::shaderInt64`.
+    Int64,
+    /// `VkPhysicalDeviceFeatures::shaderFloat64`.
+    Float64,
 }
 
 impl Feature {
@@ -23,6 +27,8 @@ impl Feature {
             Self::DynamicRendering => "dynamicRendering",
             Self::Maintenance4 => "maintenance4",
             Self::StorageImageExtendedFormats => "shaderStorageImageExtendedFormats",
+            Self::Int64 => "shaderInt64",
+            Self::Float64 => "shaderFloat64",
         }
     }
 }
@@ -43,6 +49,8 @@ pub struct DeviceRequirements {
     pub api_version: Version,
     /// Features to enable.
     pub features: &'static [FeatureRequirement],
+    /// Features to enable where there are any: passes that use one of them are refused without it, and no others.
+    pub optional_features: &'static [FeatureRequirement],
     /// Device extensions to enable.
     pub device_extensions: &'static [&'static str],
     /// Instance extensions that are of use and can be missed.
@@ -96,12 +104,16 @@ pub(crate) const REQUIREMENTS: DeviceRequirements = DeviceRequirements {
             why: "storage images of one and two channels",
         },
     ],
+    optional_features: &[
+        FeatureRequirement { feature: Feature::Int64, why: "counts of flakes beyond 2^32 in the reference methods" },
+        FeatureRequirement { feature: Feature::Float64, why: "exact tests of flakes in the reference methods" },
+    ],
     device_extensions: &[],
     optional_instance_extensions: &["VK_EXT_debug_utils"],
     queue_flags: vk::QueueFlags::from_raw(vk::QueueFlags::GRAPHICS.as_raw() | vk::QueueFlags::COMPUTE.as_raw()),
 };
 
-/// The features among those needed that a physical device offers.
+/// The features among those needed or of use that a physical device offers.
 pub(crate) fn offered(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> Vec<Feature> {
     let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
     let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan13);
@@ -115,9 +127,12 @@ pub(crate) fn offered(instance: &ash::Instance, physical_device: vk::PhysicalDev
                 Feature::DynamicRendering => vulkan13.dynamic_rendering,
                 Feature::Maintenance4 => vulkan13.maintenance4,
                 Feature::StorageImageExtendedFormats => core.shader_storage_image_extended_formats,
+                Feature::Int64 => core.shader_int64,
+                Feature::Float64 => core.shader_float64,
             }
     };
-    REQUIREMENTS.features.iter().map(|needed| needed.feature).filter(|feature| has(*feature)).collect()
+    let of_use = REQUIREMENTS.features.iter().chain(REQUIREMENTS.optional_features).map(|wanted| wanted.feature);
+    of_use.filter(|feature| has(*feature)).collect()
 }
 
 /// The names of the needed features that are not in `features`.
@@ -126,16 +141,20 @@ pub(crate) fn lacking(features: &[Feature]) -> Vec<&'static str> {
     needed.filter(|feature| !features.contains(feature)).map(Feature::name).collect()
 }
 
-/// The needed features as `vkCreateDevice` takes them.
-pub(crate) fn to_enable() -> (vk::PhysicalDeviceFeatures, vk::PhysicalDeviceVulkan13Features<'static>) {
+/// Features as `vkCreateDevice` takes them.
+pub(crate) fn to_enable(
+    features: &[Feature],
+) -> (vk::PhysicalDeviceFeatures, vk::PhysicalDeviceVulkan13Features<'static>) {
     let mut core = vk::PhysicalDeviceFeatures::default();
     let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
-    for needed in REQUIREMENTS.features {
-        match needed.feature {
+    for feature in features {
+        match feature {
             Feature::Synchronization2 => vulkan13.synchronization2 = vk::TRUE,
             Feature::DynamicRendering => vulkan13.dynamic_rendering = vk::TRUE,
             Feature::Maintenance4 => vulkan13.maintenance4 = vk::TRUE,
             Feature::StorageImageExtendedFormats => core.shader_storage_image_extended_formats = vk::TRUE,
+            Feature::Int64 => core.shader_int64 = vk::TRUE,
+            Feature::Float64 => core.shader_float64 = vk::TRUE,
         }
     }
     (core, vulkan13)

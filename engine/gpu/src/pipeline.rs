@@ -2,6 +2,7 @@
 
 use crate::device::{Device, c_string};
 use crate::error::{Call, Error};
+use crate::features::Feature;
 use crate::pipeline_cache::PipelineCache;
 use crate::vulkan_types as to_vk;
 use ash::vk;
@@ -64,6 +65,10 @@ impl Pipelines {
         if shader.params_bytes > most {
             let why = format!("{} bytes of push constants are more than this device's {most}", shader.params_bytes);
             return Err(Error::BadPass { pass: pass.to_owned(), why });
+        }
+        if let Some(feature) = capabilities(shader).find(|feature| !self.device.has(*feature)) {
+            let what = format!("the shader needs {}, which this device lacks; use another method", feature.name());
+            return Err(Error::Unsupported { pass: pass.to_owned(), what });
         }
         let name = if shader.variant.is_empty() {
             shader.name.to_owned()
@@ -270,4 +275,18 @@ fn one_of(made: Result<Vec<vk::Pipeline>, (Vec<vk::Pipeline>, vk::Result)>) -> R
         Ok(pipelines) => pipelines.first().copied().ok_or(vk::Result::ERROR_UNKNOWN),
         Err((_, result)) => Err(result),
     }
+}
+
+/// The optional features that a shader's code declares it uses: the OpCapability instructions, which come first.
+fn capabilities(shader: &Shader) -> impl Iterator<Item = Feature> {
+    const HEADER_WORDS: usize = 5;
+    /// OpCapability of one operand: two words, opcode 17.
+    const CAPABILITY: u32 = 2 << 16 | 17;
+    let instructions = shader.stages.iter().map(|stage| stage.spirv.get(HEADER_WORDS..).unwrap_or_default());
+    let declared = instructions.flat_map(|code| code.chunks_exact(2).take_while(|pair| pair[0] == CAPABILITY));
+    declared.filter_map(|pair| match pair[1] {
+        10 => Some(Feature::Float64),
+        11 => Some(Feature::Int64),
+        _ => None,
+    })
 }

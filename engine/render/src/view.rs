@@ -15,12 +15,14 @@ pub struct View {
     pub jitter: [f64; 2],
     /// Factor of the radiance before tone mapping.
     pub exposure: f32,
+    /// Which sample of its pixels the frame is.
+    pub sample_index: u32,
 }
 
 impl View {
     /// A view through pixel centres, exposure 1.
     pub fn new(camera: Camera, size: [u32; 2]) -> Self {
-        Self { camera, size, jitter: [0.0; 2], exposure: 1.0 }
+        Self { camera, size, jitter: [0.0; 2], exposure: 1.0, sample_index: 0 }
     }
 
     /// The same view, its rays moved within their pixels by the `index`-th point of a sequence that fills the pixel
@@ -28,7 +30,7 @@ impl View {
     pub fn sample(&self, index: u32) -> Self {
         const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_2];
         let jitter = STEPS.map(|step| (f64::from(index) * step + 0.5).fract() - 0.5);
-        Self { jitter, ..self.clone() }
+        Self { jitter, sample_index: index, ..self.clone() }
     }
 
     /// The camera's part of the frame's constants. Scene space is world space about `center`.
@@ -68,6 +70,7 @@ impl View {
             ray_dy: xyz0(dy),
             width: self.size[0],
             height: self.size[1],
+            sample_index: self.sample_index,
             ..Default::default()
         }
     }

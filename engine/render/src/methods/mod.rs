@@ -1,5 +1,6 @@
 //! How glints are estimated: each method in a file of its own, which says what it claims and what it can be set to.
 
+mod lobe;
 mod smooth;
 mod wang2020;
 
@@ -144,6 +145,18 @@ pub struct GlintMaterial {
     pub uv_set: u32,
 }
 
+impl GlintMaterial {
+    /// sin^2(gamma/2), of which 1 - cos gamma is twice: computed in f64, as f32 loses it for small angles.
+    pub(crate) fn sin2_half_gamma(&self) -> f64 {
+        (0.5 * self.values.number("gamma_deg").to_radians()).sin().powi(2)
+    }
+
+    /// Solid angle of the reflection cone in steradians: sigma.
+    pub(crate) fn solid_angle(&self) -> f64 {
+        4.0 * std::f64::consts::PI * self.sin2_half_gamma()
+    }
+}
+
 /// What a method may read when it shades.
 pub(crate) struct Shading<'a> {
     pub scene: &'a SceneBuffers,
@@ -151,6 +164,27 @@ pub(crate) struct Shading<'a> {
     pub gbuffer: &'a GBuffer,
     pub shadow_mask: &'a Image,
 }
+
+/// Fills the `Bind` of a glint shader: what all of them read, and what is its method's own.
+macro_rules! bind_glints {
+    ($bind:ident, $shading:expr, $glints:expr $(, $name:ident: $value:expr)* $(,)?) => {
+        $bind {
+            frame: $shading.frame,
+            instances: &$shading.scene.instances.buffer,
+            lights: &$shading.scene.lights.buffer,
+            ids: &$shading.gbuffer.ids,
+            position: &$shading.gbuffer.position,
+            normal: &$shading.gbuffer.normal,
+            uv: &$shading.gbuffer.uv,
+            footprint: &$shading.gbuffer.footprint,
+            specular: &$shading.gbuffer.specular,
+            shadow_mask: $shading.shadow_mask,
+            $($name: $value,)*
+            glints: &mut *$glints,
+        }
+    };
+}
+pub(crate) use bind_glints;
 
 /// A method at work: its tables, and the passes that fill and read them.
 pub(crate) trait Method {

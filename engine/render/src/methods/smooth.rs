@@ -2,8 +2,9 @@
 //!
 //! The environment's part is a split sum (Karis 2013): exact in the lobe's albedo, approximate in the lobe's shape.
 
-use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading};
-use crate::environment_tables::{EnvironmentTables, Lobe};
+use super::lobe::SmoothEnvironment;
+use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
+use crate::environment_tables::EnvironmentTables;
 use mica_graph::{Graph, Image};
 use mica_shaders::glints::smooth::{Bind, Params};
 
@@ -20,35 +21,18 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 /// The smooth limit at work. It needs no tables of its own, only the environment's.
 #[derive(Default)]
 pub(crate) struct Smooth {
-    lobe: Option<Lobe>,
+    environment: SmoothEnvironment,
 }
 
 impl Method for Smooth {
     fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables) {
-        if self.lobe.is_none() {
-            g.because(format!("material {}: smooth lobe under the environment; first frame", material.name));
-            self.lobe = Some(environment.beckmann(g));
-        }
+        self.environment.update(g, material, environment);
     }
 
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
-        let Some(lobe) = &self.lobe else { return };
+        let Some(lobe) = self.environment.lobe() else { return };
         let params = Params { material: material.index as u32, alpha: material.values.number("alpha") as f32 };
-        let bind = Bind {
-            frame: shading.frame,
-            instances: &shading.scene.instances.buffer,
-            lights: &shading.scene.lights.buffer,
-            ids: &shading.gbuffer.ids,
-            position: &shading.gbuffer.position,
-            normal: &shading.gbuffer.normal,
-            uv: &shading.gbuffer.uv,
-            footprint: &shading.gbuffer.footprint,
-            specular: &shading.gbuffer.specular,
-            shadow_mask: shading.shadow_mask,
-            prefiltered: &lobe.prefiltered,
-            albedo: &lobe.albedo,
-            glints: &mut *glints,
-        };
+        let bind = bind_glints!(Bind, shading, glints, prefiltered: &lobe.prefiltered, albedo: &lobe.albedo);
         // Its own name: it shares the frame of the glints' shader, but there are no glints.
         g.pass_named(INFO.name, bind, params, shading.gbuffer.ids.extent());
     }

@@ -19,14 +19,14 @@
 mod dpf;
 mod tables;
 
-use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading};
+use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use crate::{Cache, Progress, RenderError, Update};
 use dpf::DpfSource;
 use mica_gpu::Executor;
 use mica_graph::{Buffer, Graph, Image};
-use mica_shaders::glints;
+use mica_shaders::glints::wang2020::{Bind, Params};
 use std::collections::BTreeMap;
 use tables::Tables;
 
@@ -173,12 +173,11 @@ impl Method for Wang2020 {
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
         let Some(tables) = self.tables.get(&material.index) else { return };
         let values = &material.values;
-        let half_gamma = 0.5 * values.number("gamma_deg").to_radians();
         let depth = values.number("depth") as u32;
-        let params = glints::wang2020::Params {
+        let params = Params {
             material: material.index as u32,
             alpha: alpha(material) as f32,
-            solid_angle: (4.0 * std::f64::consts::PI * half_gamma.sin().powi(2)) as f32,
+            solid_angle: material.solid_angle() as f32,
             flakes: flakes(material) as f32,
             depth,
             cut_depth: (values.number("cut_depth") as u32).min(depth),
@@ -187,23 +186,13 @@ impl Method for Wang2020 {
             macro_above: values.number("macro") as f32,
             cosine: u32::from(values.flag("cosine")),
         };
-        let bind = glints::wang2020::Bind {
-            frame: shading.frame,
-            instances: &shading.scene.instances.buffer,
-            lights: &shading.scene.lights.buffer,
-            ids: &shading.gbuffer.ids,
-            position: &shading.gbuffer.position,
-            normal: &shading.gbuffer.normal,
-            uv: &shading.gbuffer.uv,
-            footprint: &shading.gbuffer.footprint,
-            specular: &shading.gbuffer.specular,
-            shadow_mask: shading.shadow_mask,
+        let bind = bind_glints!(
+            Bind, shading, glints,
             accumulated: &tables.accumulated,
             prefiltered: &tables.prefiltered,
             nodes: &tables.nodes,
             bounds: &tables.bounds,
-            glints: &mut *glints,
-        };
+        );
         g.pass(bind, params, shading.gbuffer.ids.extent());
     }
 
