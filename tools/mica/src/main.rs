@@ -1,5 +1,6 @@
 //! Mica without a window: renders, measures and explains glints.
 
+mod accuracy;
 mod args;
 mod change;
 mod doctor;
@@ -49,6 +50,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Scenes(args) => scenes::scenes(args),
         Command::Methods(args) => methods::methods(args),
         Command::Explain(args) => explain::explain(args),
+        Command::Accuracy(args) => accuracy::accuracy(args),
         Command::Doctor(args) => doctor::doctor(args),
     }
 }

@@ -75,14 +75,19 @@ impl Picture {
 
     /// The tone-mapped picture as a PNG file.
     pub fn png(&self) -> std::result::Result<Vec<u8>, Failure> {
-        use image::ImageEncoder;
         let rgb: Vec<u8> = self.display.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
-        let mut bytes = Vec::new();
-        image::codecs::png::PngEncoder::new(&mut bytes)
-            .write_image(&rgb, self.size[0], self.size[1], image::ExtendedColorType::Rgb8)
-            .map_err(|error| Failure::bad_input(format!("the picture cannot be written as PNG: {error}")))?;
-        Ok(bytes)
+        png_of(&rgb, self.size)
     }
+}
+
+/// Red, green and blue of each pixel, sRGB-encoded, as a PNG file.
+pub fn png_of(rgb: &[u8], [width, height]: [u32; 2]) -> std::result::Result<Vec<u8>, Failure> {
+    use image::ImageEncoder;
+    let mut bytes = Vec::new();
+    image::codecs::png::PngEncoder::new(&mut bytes)
+        .write_image(rgb, width, height, image::ExtendedColorType::Rgb8)
+        .map_err(|error| Failure::bad_input(format!("the picture cannot be written as PNG: {error}")))?;
+    Ok(bytes)
 }
 
 /// Text as EXR attributes hold it; whatever is not ASCII is escaped.

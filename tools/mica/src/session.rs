@@ -10,6 +10,7 @@ use mica_gpu::{Device, DeviceInfo, DeviceKind, DeviceOptions, Executor, Executor
 use mica_graph::{Graph, Plan};
 use mica_render::scene::Camera;
 use mica_render::{Cache, Frame, LeftOut, OcclusionBackend, Renderer, Update, View, method};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -112,11 +113,7 @@ impl Session {
 
         let device = Device::new(&DeviceOptions { select: args.device.clone(), validation: args.validation })?;
         check_size(args.size, device.info())?;
-        let cache = match (&args.cache, args.no_cache) {
-            (_, true) => None,
-            (Some(folder), false) => Some(Cache::new(folder)),
-            (None, false) => Cache::of_user(),
-        };
+        let cache = cache(args.cache.as_deref(), args.no_cache);
         let executor = executor(device, cache.as_ref(), args.memory)?;
         Ok(Self {
             scene: name,
@@ -213,7 +210,21 @@ fn check_size(size: [u32; 2], device: &DeviceInfo) -> Result<(), Failure> {
     Err(Failure::bad_input(format!("--size {width}x{height}: {} holds images of {most} pixels a side", device.name)))
 }
 
-fn executor(device: Arc<Device>, cache: Option<&Cache>, memory_mebibytes: Option<u64>) -> Result<Executor, Failure> {
+/// Where tables and pipelines are kept, if they are.
+pub fn cache(folder: Option<&Path>, none: bool) -> Option<Cache> {
+    match (folder, none) {
+        (_, true) => None,
+        (Some(folder), false) => Some(Cache::new(folder)),
+        (None, false) => Cache::of_user(),
+    }
+}
+
+/// What runs frames on a device.
+pub fn executor(
+    device: Arc<Device>,
+    cache: Option<&Cache>,
+    memory_mebibytes: Option<u64>,
+) -> Result<Executor, Failure> {
     let name: String = device.info().name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
     let pipeline_cache = cache.map(|cache| cache.folder().join(format!("pipelines-{name}.bin")));
     let mut options = ExecutorOptions { pipeline_cache, ..Default::default() };

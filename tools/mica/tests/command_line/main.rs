@@ -1,5 +1,6 @@
 //! The command line as a user meets it: what is printed, what is written, and how it ends.
 
+mod accuracy;
 mod information;
 mod mistakes;
 mod render;
