@@ -1,10 +1,12 @@
 //! The whole program against the oracle and against its claims, under validation and synchronisation validation.
 
 mod borrowed;
+mod claims;
 mod foreign_models;
 mod frames;
 mod occlusion;
 mod orientation;
+mod settings;
 mod smooth;
 mod stage;
 mod wang2020_quadtree;

@@ -420,7 +420,7 @@ fn glint_materials(scene: &Scene) -> Vec<GlintMaterial> {
         let asked = glint.method.as_deref().unwrap_or(DEFAULT_METHOD);
         let info = methods::method(asked).unwrap_or_else(|error| {
             log::warn!("material {}: {error}: {DEFAULT_METHOD} renders it", material.name);
-            &methods::METHODS[methods::METHODS.len() - 1]
+            methods::default_method()
         });
         let mut values = info.values();
         let [r, g, b, _] = material.base_color;

@@ -15,13 +15,13 @@ use mica_graph::{Buffer, Graph, Image};
 /// What a method promises of its pictures; the tests hold it to this.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Claim {
-    /// The very flakes, pixel by pixel.
+    /// The very flakes of `shared/flake_set.glsl`, pixel by pixel.
     Pixels,
-    /// The distribution of pixel values.
+    /// The distribution of pixel values: mean, variance, share of dark pixels, and whole numbers of flakes.
     Distribution,
-    /// The mean.
+    /// The mean over many pixels: that of the smooth limit.
     Mean,
-    /// A look.
+    /// A look: its mean is bounded, and nothing else.
     Look,
 }
 
@@ -57,6 +57,9 @@ pub struct MethodInfo {
     pub summary: &'static str,
     /// What it promises.
     pub claim: Claim,
+    /// How far its mean may be from the truth, as a share of it, where the cone is narrow beside the lobe (the grid of
+    /// `tests/tests/claims.rs`).
+    pub mean_within: f64,
     /// Its settings beyond those that every method has.
     pub settings: &'static [Setting],
     /// From cheap to dear.
@@ -121,6 +124,11 @@ pub fn method(name: &str) -> Result<&'static MethodInfo, SettingError> {
         name: name.to_owned(),
         known: METHODS.iter().map(|method| method.name).collect::<Vec<_>>().join(", "),
     })
+}
+
+/// The method of materials that name none.
+pub(crate) fn default_method() -> &'static MethodInfo {
+    METHODS.iter().find(|method| method.name == DEFAULT_METHOD).unwrap_or(&METHODS[0])
 }
 
 impl MethodInfo {
