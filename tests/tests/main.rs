@@ -1,6 +1,7 @@
 //! The whole program against the oracle and against its claims, under validation and synchronisation validation.
 
 mod borrowed;
+mod chermain;
 mod claims;
 mod foreign_models;
 mod frames;

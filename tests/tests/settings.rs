@@ -2,14 +2,17 @@
 
 use mica_render::scene::{EquirectMap, Glint, Light};
 use mica_render::{Environment, Kind, METHODS, MethodInfo, OcclusionBackend, Renderer};
-use mica_tests::shapes::{OVER_PLANE, conductor, plane};
+use mica_tests::shapes::{Eye, conductor, plane};
 use mica_tests::{Gpu, Picture};
 
 const SIZE: [u32; 2] = [48, 27];
+/// Along the plane, askew to its texture: footprints are long and lie across its axes.
+const ALONG_PLANE: Eye =
+    Eye { eye: glam::DVec3::new(2.0, 0.4, 2.5), target: glam::DVec3::new(0.3, 0.0, 0.2), vertical_fov_radians: 0.15 };
 
 /// The plane under a lamp, and under a sky where that is asked for: tables made from it take their time.
 fn shown(gpu: &mut Gpu, method: &MethodInfo, set: &[(&str, &str)], sky: bool) -> Picture {
-    let lamp = Light::Point { position: glam::DVec3::new(0.4, 1.2, -1.0), radiant_intensity: [5.0; 3], range: None };
+    let lamp = Light::Point { position: glam::DVec3::new(-1.0, 0.5, -1.5), radiant_intensity: [5.0; 3], range: None };
     let environment = Environment { map: EquirectMap::constant([0.5, 0.6, 0.7]), rotation_radians: 0.3 };
     let glint = Glint { count: 3e4, alpha: 0.2, gamma_deg: 3.0, ..Glint::default() };
     let scene = plane(conductor(method.name, glint), 40.0);
@@ -19,7 +22,7 @@ fn shown(gpu: &mut Gpu, method: &MethodInfo, set: &[(&str, &str)], sky: bool) ->
         renderer.set(None, key, value).unwrap_or_else(|error| panic!("{}: {error}", method.name));
     }
     gpu.precompute(&mut renderer);
-    gpu.render(&mut renderer, &OVER_PLANE.view(SIZE)).picture
+    gpu.render(&mut renderer, &ALONG_PLANE.view(SIZE)).picture
 }
 
 fn assert_sound(picture: &Picture, what: &str) {

@@ -1,5 +1,6 @@
 //! How glints are estimated: each method in a file of its own, which says what it claims and what it can be set to.
 
+mod chermain;
 mod lobe;
 mod smooth;
 mod wang2020;
@@ -66,8 +67,27 @@ pub struct MethodInfo {
     pub ladder: &'static [Rung],
 }
 
-/// The methods there are.
-pub const METHODS: &[MethodInfo] = &[smooth::INFO, wang2020::INFO];
+/// The one list of methods: what each says of itself, and how it is started.
+macro_rules! methods {
+    ($($module:ident::$method:ident),* $(,)?) => {
+        /// The methods there are.
+        pub const METHODS: &[MethodInfo] = &[$($module::INFO),*];
+
+        /// The method of that name, at work.
+        pub(crate) fn start(info: &MethodInfo) -> Box<dyn Method> {
+            $(if info.name == $module::INFO.name {
+                return Box::new($module::$method::default());
+            })*
+            Box::new(smooth::Smooth::default())
+        }
+    };
+}
+
+methods! {
+    smooth::Smooth,
+    chermain::Chermain,
+    wang2020::Wang2020,
+}
 
 /// The method of materials that name none.
 pub const DEFAULT_METHOD: &str = "wang2020";
@@ -230,12 +250,4 @@ pub(crate) struct Finish {
     pub visibility_blur: i32,
     /// Taps on each side of the centre of the glints' blur.
     pub glint_blur: i32,
-}
-
-/// The method of that name, at work.
-pub(crate) fn start(info: &MethodInfo) -> Box<dyn Method> {
-    match info.name {
-        "wang2020" => Box::new(wang2020::Wang2020::default()),
-        _ => Box::new(smooth::Smooth::default()),
-    }
 }
