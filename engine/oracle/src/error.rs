@@ -33,6 +33,14 @@ pub enum OracleError {
         /// How many it takes.
         needed: usize,
     },
+    /// A flake of a list that cannot be one.
+    #[error("flake {row}, counted from 0, {what}")]
+    Flake {
+        /// Its place in the list.
+        row: usize,
+        /// What is wrong with it.
+        what: &'static str,
+    },
     /// The camera has no viewing direction.
     #[error("the camera's target is its eye; move one of them")]
     CameraWithoutDirection,

@@ -8,7 +8,13 @@
 //! Radiance is linear RGB, angles are radians unless a name says otherwise.
 
 pub mod albedo;
+pub mod cone_mean;
+pub mod discrete;
 mod error;
+pub mod flake_image;
+pub mod flake_list;
+pub mod flake_set;
+mod footprint;
 pub mod image;
 pub mod lit_probability;
 pub mod microfacet;
@@ -19,4 +25,4 @@ pub mod statistics;
 pub mod wang2020;
 
 pub use error::OracleError;
-pub use glam::DVec3;
+pub use glam::{DVec2, DVec3};

@@ -57,7 +57,7 @@ pub fn lit_probability(facets: &Microfacets, i: DVec3, o: DVec3, gamma_radians: 
 /// Breakpoints on [-pi/2, pi/2] about the nearest point of a convex set that does not hold the origin, whose squared
 /// distance along ray t is `begin_squared(t)`: finest at that point, doubling outwards, and for Beckmann ending
 /// where the density has become negligible. None at all where it is 0 throughout.
-fn graded_breakpoints(facets: &Microfacets, begin_squared: impl Fn(f64) -> f64) -> Vec<f64> {
+pub(crate) fn graded_breakpoints(facets: &Microfacets, begin_squared: impl Fn(f64) -> f64) -> Vec<f64> {
     // Distance to a convex set is quasi-convex in the angle: golden-section search finds its least value.
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let (mut low, mut high) = (-FRAC_PI_2, FRAC_PI_2);

@@ -115,9 +115,19 @@ impl Camera {
 impl PixelRays {
     /// The unit direction through the centre of the pixel in column `x` and row `y`, row 0 being the top.
     pub(crate) fn direction(&self, x: usize, y: usize) -> DVec3 {
+        self.ray(x, y).normalize()
+    }
+
+    /// The same, of length 1 along the camera's axis.
+    pub(crate) fn ray(&self, x: usize, y: usize) -> DVec3 {
         let across = 2.0 * (x as f64 + 0.5) / self.size.width as f64 - 1.0;
         let upward = 1.0 - 2.0 * (y as f64 + 0.5) / self.size.height as f64;
-        (self.forward + across * self.right + upward * self.up).normalize()
+        self.forward + across * self.right + upward * self.up
+    }
+
+    /// How [`Self::ray`] changes from one column to the next, and from one row to the next.
+    pub(crate) fn steps(&self) -> [DVec3; 2] {
+        [2.0 / self.size.width as f64 * self.right, -2.0 / self.size.height as f64 * self.up]
     }
 }
 

@@ -4,6 +4,7 @@ use crate::change::Change;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use glam::DVec3;
 use mica_render::scene::Light;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 /// Render, measure and explain glints, without a window.
@@ -36,6 +37,8 @@ pub enum Command {
     Accuracy(AccuracyArgs),
     /// Say whether this machine can render, and what is missing if not.
     Doctor(DoctorArgs),
+    /// Evaluate the glint model in f64, flake by flake, without a GPU.
+    Oracle(OracleArgs),
 }
 
 /// For commands that print little.
@@ -232,6 +235,52 @@ pub struct DoctorArgs {
     pub json: bool,
 }
 
+/// `mica oracle`.
+#[derive(Debug, Args)]
+#[command(after_long_help = crate::oracle::DEFINITIONS)]
+pub struct OracleArgs {
+    /// Roughness: slopes of flakes have the variance alpha^2 / 2 along each axis.
+    #[arg(long, value_name = "A", default_value_t = 0.3, value_parser = alpha, allow_hyphen_values = true)]
+    pub alpha: f64,
+    /// Half-angle of the cone into which a flake reflects, degrees.
+    #[arg(long, value_name = "G", default_value_t = 3.0, value_parser = gamma_deg, allow_hyphen_values = true)]
+    pub gamma_deg: f64,
+    /// Flakes in each square of texture, rounded to a whole number.
+    #[arg(long, value_name = "N", default_value_t = 1e5, value_parser = count, allow_hyphen_values = true)]
+    pub count: f64,
+    /// The footprint in texture space: a corner and the two sides that begin there.
+    #[arg(long, value_name = "PU,PV,E1U,E1V,E2U,E2V", default_value = "0.1,0.2,0.05,0,0,0.05", value_parser = footprint)]
+    #[arg(allow_hyphen_values = true)]
+    pub footprint: Parallelogram,
+    /// Towards the light: degrees from the normal, and about it.
+    #[arg(long, value_name = "THETA,PHI", default_value = "30,180", value_parser = angles, allow_hyphen_values = true)]
+    pub light: Angles,
+    /// Towards the viewer: degrees from the normal, and about it.
+    #[arg(long, value_name = "THETA,PHI", default_value = "30,0", value_parser = angles, allow_hyphen_values = true)]
+    pub view: Angles,
+    /// How many sets of flakes are drawn, with the seeds 0 to K - 1.
+    #[arg(long, value_name = "K", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub seeds: u32,
+    /// Flakes one by one in place of drawn ones: a NumPy file of N x 5 f64, the columns u, v, mx, my, mz.
+    #[arg(long, value_name = "FILE.npy", requires = "queries", conflicts_with_all = ["alpha", "gamma_deg", "count", "footprint", "light", "view", "seeds"])]
+    pub flakes: Option<PathBuf>,
+    /// What is asked of these flakes: a JSON array of {"alpha", "gamma_deg", "i": [x, y, z], "o": [x, y, z], "para": [pu, pv,
+    /// e1u, e1v, e2u, e2v]}. Prints an array of {"in_area", "count", "f"} in the same order.
+    #[arg(long, value_name = "FILE.json", requires = "flakes")]
+    pub queries: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A corner and two sides, as (u, v) each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parallelogram(pub [f64; 6]);
+
+/// Degrees from the normal, and about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Angles(pub [f64; 2]);
+
 /// Who answers questions about occlusion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum OcclusionChoice {
@@ -261,8 +310,11 @@ pub struct CameraChoice {
 
 /// Most pixels along a side: what every device with Vulkan 1.3 can be expected to stop at.
 const LARGEST_SIDE: u32 = 16384;
+/// Roughnesses, and half-angles of cones in degrees, that flakes may have.
+pub const ALPHAS: RangeInclusive<f64> = 0.001..=1.0;
+pub const GAMMAS_DEG: RangeInclusive<f64> = 0.01..=30.0;
 /// Coordinates beyond this are meaningless in metres, and their squares leave f32.
-const LARGEST_COORDINATE: f64 = 1e9;
+pub const LARGEST_COORDINATE: f64 = 1e9;
 
 fn size(text: &str) -> Result<[u32; 2], String> {
     let wanted = || format!("expected WIDTHxHEIGHT, each 1 to {LARGEST_SIDE}, such as 1920x1080");
@@ -285,6 +337,32 @@ fn finite(text: &str) -> Result<f64, String> {
 
 fn exposure(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|stops| stops.abs() <= 32.0).ok_or_else(|| "expected stops from -32 to 32".into())
+}
+
+fn alpha(text: &str) -> Result<f64, String> {
+    let accepted = |alpha: &f64| ALPHAS.contains(alpha);
+    finite(text).ok().filter(accepted).ok_or_else(|| format!("expected {} to {}", ALPHAS.start(), ALPHAS.end()))
+}
+
+fn gamma_deg(text: &str) -> Result<f64, String> {
+    let accepted = |gamma: &f64| GAMMAS_DEG.contains(gamma);
+    let wanted = || format!("expected degrees from {} to {}", GAMMAS_DEG.start(), GAMMAS_DEG.end());
+    finite(text).ok().filter(accepted).ok_or_else(wanted)
+}
+
+fn count(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|count| (0.0..=1e12).contains(count)).ok_or_else(|| "expected 0 to 1e12".into())
+}
+
+fn footprint(text: &str) -> Result<Parallelogram, String> {
+    let fits = |numbers: &[f64; 6]| numbers.iter().all(|number| number.abs() <= LARGEST_COORDINATE);
+    let wanted = || format!("expected six numbers PU,PV,E1U,E1V,E2U,E2V up to {LARGEST_COORDINATE:e}");
+    numbers(text).filter(fits).map(Parallelogram).ok_or_else(wanted)
+}
+
+fn angles(text: &str) -> Result<Angles, String> {
+    let wanted = || "expected THETA,PHI in degrees, THETA from -180 to 180".to_owned();
+    numbers(text).filter(|[theta, _]: &[f64; 2]| theta.abs() <= 180.0).map(Angles).ok_or_else(wanted)
 }
 
 /// So many finite numbers between commas.

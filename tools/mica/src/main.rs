@@ -10,6 +10,7 @@ mod explain;
 mod interrupt;
 mod measure;
 mod methods;
+mod oracle;
 mod output;
 mod picture;
 mod progress;
@@ -52,6 +53,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Explain(args) => explain::explain(args),
         Command::Accuracy(args) => accuracy::accuracy(args),
         Command::Doctor(args) => doctor::doctor(args),
+        Command::Oracle(args) => oracle::oracle(args),
     }
 }
 

@@ -3,6 +3,7 @@
 mod accuracy;
 mod information;
 mod mistakes;
+mod oracle;
 mod render;
 
 use serde_json::Value as Json;
