@@ -16,6 +16,7 @@ pub mod flake_list;
 pub mod flake_set;
 mod footprint;
 pub mod image;
+pub mod jakob;
 pub mod lit_probability;
 pub mod microfacet;
 mod quadrature;
