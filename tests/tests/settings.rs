@@ -36,8 +36,6 @@ fn assert_sound(picture: &Picture, what: &str) {
 fn every_flag_and_every_choice_shows_a_sound_picture_of_its_own() {
     let mut gpu = Gpu::new();
     for method in METHODS {
-        let default = shown(&mut gpu, method, &[], true);
-        assert_sound(&default, method.name);
         for setting in method.settings {
             let values: Vec<&str> = match setting.kind {
                 Kind::Flag => vec!["true", "false"],
@@ -45,12 +43,17 @@ fn every_flag_and_every_choice_shows_a_sound_picture_of_its_own() {
                 Kind::Choice(words) => words.iter().copied().filter(|word| *word != "counted").collect(),
                 _ => continue,
             };
-            let pictures: Vec<Picture> =
-                values.iter().map(|value| shown(&mut gpu, method, &[(setting.key, value)], true)).collect();
-            for (value, picture) in values.iter().zip(&pictures) {
-                assert_sound(picture, &format!("{} {}={value}", method.name, setting.key));
-            }
-            let changed = pictures.iter().any(|picture| !picture.differing(&default).is_empty());
+            // Few flakes; so many that what is done for many of them is called for; far from the texture's origin.
+            let calls = [("count", "3e4"), ("count", "1e7"), ("uv_scale", "1e5")];
+            let changed = calls.iter().any(|call| {
+                let picture_of = |gpu: &mut Gpu, value: &str| {
+                    let picture = shown(gpu, method, &[*call, (setting.key, value)], true);
+                    assert_sound(&picture, &format!("{} {}={value}, {call:?}", method.name, setting.key));
+                    picture
+                };
+                let first = picture_of(&mut gpu, values[0]);
+                values[1..].iter().any(|value| !picture_of(&mut gpu, value).differing(&first).is_empty())
+            });
             assert!(changed || values.len() < 2, "{}: {} changes nothing", method.name, setting.key);
         }
     }

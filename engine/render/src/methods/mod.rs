@@ -2,8 +2,11 @@
 
 mod chermain;
 mod lobe;
+mod shopf;
 mod smooth;
 mod wang2020;
+mod wang_bowles;
+mod zirr_kaplanyan;
 
 use crate::environment_tables::EnvironmentTables;
 use crate::passes::GBuffer;
@@ -85,8 +88,11 @@ macro_rules! methods {
 
 methods! {
     smooth::Smooth,
-    chermain::Chermain,
     wang2020::Wang2020,
+    zirr_kaplanyan::ZirrKaplanyan,
+    wang_bowles::WangBowles,
+    shopf::Shopf,
+    chermain::Chermain,
 }
 
 /// The method of materials that name none.
@@ -182,6 +188,13 @@ impl GlintMaterial {
     /// Solid angle of the reflection cone in steradians: sigma.
     pub(crate) fn solid_angle(&self) -> f64 {
         4.0 * std::f64::consts::PI * self.sin2_half_gamma()
+    }
+
+    /// Flakes of a square of texture space that are lit where the lobe is brightest, seen and lit along the normal: the
+    /// cone's solid angle times D(n) / 4 is the probability, while the cone is narrower than the lobe.
+    pub(crate) fn lit_at_most(&self) -> f64 {
+        let alpha = self.values.number("alpha");
+        self.values.number("count") * (self.sin2_half_gamma() / (alpha * alpha)).min(1.0)
     }
 }
 
