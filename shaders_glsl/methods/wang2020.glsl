@@ -4,6 +4,7 @@
 // depend on the light; one lambda a flake, so that those with a small one never go out; scales switched at 4 and 64
 // flakes in the footprint, whether lit or not; flakes without a place inside their leaf, so that magnified leaves are
 // squares.
+#include "shared/footprint.glsl"
 #include "shared/hash.glsl"
 #include "shared/microfacet.glsl"
 #include "shared/smooth_lobe.glsl"
@@ -32,40 +33,6 @@ const uint MAX_LEAF_FLAKES = 128u; // A leaf with more flakes than this contribu
 // Steps left to this invocation. One driver ends an invocation silently after 65,535 loop iterations, and counts those of
 // eight invocations that run as one vector together: the longest of them at every step.
 int steps_left = 7000;
-
-// The integral of min(max(y, 0), 1) from 0 to y.
-float clamped_integral(float y) {
-  return y <= 0.0 ? 0.0 : (y < 1.0 ? 0.5 * y * y : y - 0.5);
-}
-
-// Signed area, inside the unit square, below the edge from p to q.
-float area_below(vec2 p, vec2 q) {
-  vec2 left = p.x < q.x ? p : q;
-  vec2 right = p.x < q.x ? q : p;
-  float width = right.x - left.x;
-  if (width < 1e-9 || right.x <= 0.0 || left.x >= 1.0) {
-    return 0.0;
-  }
-  float slope = (right.y - left.y) / width;
-  float from = max(left.x, 0.0);
-  float to = min(right.x, 1.0);
-  float y0 = left.y + (from - left.x) * slope;
-  float y1 = left.y + (to - left.x) * slope;
-  float area = abs(y1 - y0) < 1e-3
-    ? clamp(0.5 * (y0 + y1), 0.0, 1.0) * (to - from)
-    : (to - from) * (clamped_integral(y1) - clamped_integral(y0)) / (y1 - y0);
-  return p.x < q.x ? area : -area;
-}
-
-// Share of a box that lies in the parallelogram.
-float share_inside(vec4 box, vec2 corner, vec2 side_x, vec2 side_y) {
-  vec2 size = box.zw - box.xy;
-  vec2 a = (corner - box.xy) / size;
-  vec2 x = side_x / size;
-  vec2 y = side_y / size;
-  float area = area_below(a, a + x) + area_below(a + x, a + x + y) + area_below(a + x + y, a + y) + area_below(a + y, a);
-  return min(abs(area), 1.0);
-}
 
 // Bits of x and y in turn: the place of a node in its level.
 uint interleaved(uvec2 cell) {

@@ -29,6 +29,14 @@ vec3 direction_from(vec2 octahedral) {
   return normalize(direction);
 }
 
+// A direction at most gamma from the axis, all being as likely. From sin^2(gamma/2), as 1 - cos(gamma) loses digits.
+vec3 direction_in_cone(vec3 axis, float sin2_half_gamma, vec2 u) {
+  float from_axis = 2.0 * sin2_half_gamma * u.x;
+  float sine = sqrt(from_axis * (2.0 - from_axis));
+  float turn = 2.0 * PI * u.y;
+  return frame_about(axis) * vec3(sine * cos(turn), sine * sin(turn), 1.0 - from_axis);
+}
+
 // Point `index` of `count` of the Hammersley set, inside the unit square.
 vec2 hammersley(uint index, uint count) {
   return vec2((float(index) + 0.5) / float(count), (float(bitfieldReverse(index) >> 8) + 0.5) * (1.0 / 16777216.0));

@@ -1,4 +1,4 @@
-// The grid of the directional probability function of Wang et al. 2020: entries at whole degrees.
+// The grid of the directional probability function of Wang et al. 2018 and 2020: entries at whole degrees.
 #ifndef DPF_GLSL
 #define DPF_GLSL
 #include "shared/constants.glsl"

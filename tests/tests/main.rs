@@ -1,5 +1,6 @@
 //! The whole program against the oracle and against its claims, under validation and synchronisation validation.
 
+mod atanasov;
 mod borrowed;
 mod chermain;
 mod claims;
@@ -12,6 +13,7 @@ mod settings;
 mod shopf;
 mod smooth;
 mod stage;
+mod wang2018;
 mod wang2020_quadtree;
 mod wang2020_shading;
 mod wang2020_tables;

@@ -286,7 +286,8 @@ impl Renderer {
         let shadow_mask = shadow_mask.as_ref().unwrap_or(&self.no_lights);
         g.because("every frame");
         let base = passes::base::base(g, &self.buffers, &self.environment, &frame, &gbuffer, shadow_mask);
-        let shading = Shading { scene: &self.buffers, frame: &frame, gbuffer: &gbuffer, shadow_mask };
+        let environment = self.environment.map();
+        let shading = Shading { scene: &self.buffers, frame: &frame, gbuffer: &gbuffer, shadow_mask, environment };
         let mut radiance = base;
         for (finish, materials) in &layers {
             let layer = self.specular_layer(g, materials, &shading, *finish);

@@ -1,9 +1,12 @@
 //! How glints are estimated: each method in a file of its own, which says what it claims and what it can be set to.
 
+mod atanasov;
 mod chermain;
+mod dpf;
 mod lobe;
 mod shopf;
 mod smooth;
+mod wang2018;
 mod wang2020;
 mod wang_bowles;
 mod zirr_kaplanyan;
@@ -88,7 +91,9 @@ macro_rules! methods {
 
 methods! {
     smooth::Smooth,
+    wang2018::Wang2018,
     wang2020::Wang2020,
+    atanasov::Atanasov,
     zirr_kaplanyan::ZirrKaplanyan,
     wang_bowles::WangBowles,
     shopf::Shopf,
@@ -204,6 +209,8 @@ pub(crate) struct Shading<'a> {
     pub frame: &'a Buffer,
     pub gbuffer: &'a GBuffer,
     pub shadow_mask: &'a Image,
+    /// The environment's map with its levels; a black texel without one.
+    pub environment: &'a Image,
 }
 
 /// Fills the `Bind` of a glint shader: what all of them read, and what is its method's own.

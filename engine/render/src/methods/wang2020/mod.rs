@@ -1,6 +1,6 @@
 //! Wang, Deng, Holzschuch 2020: "Real-Time Glints Rendering with Prefiltered Discrete Stochastic Microfacets".
 //!
-//! As printed, faults included; `wang2020.glsl` and the passes in `passes/wang2020` name them where they happen:
+//! As printed, faults included; `wang2020.glsl` and the passes in `passes/wang2020` and `passes/dpf` name them where they happen:
 //! - Eqs. 16 and 21 have no cosine of the incident light: energy grows at grazing light (`cosine=true` repairs it);
 //! - 64 directions drawn from the BRDF stand for the whole environment: a sun in the map is missed by most of them, and
 //!   hardly lights (give it to the scene as a light);
@@ -16,19 +16,24 @@
 //! environment, so that an edit of the colour rebuilds nothing; offsets of the accumulation fill gamma degrees an axis,
 //! so that their entries' solid angles add up to the cone's.
 
-mod dpf;
 mod tables;
 
+use super::dpf::{self, DpfSource};
 use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use crate::{Cache, Progress, RenderError, Update};
-use dpf::DpfSource;
 use mica_gpu::Executor;
 use mica_graph::{Buffer, Graph, Image};
+use mica_shaders::constants::DPF_ROUGHNESSES;
 use mica_shaders::glints::wang2020::{Bind, Params};
 use std::collections::BTreeMap;
 use tables::Tables;
+
+/// The roughnesses at which the paper tabulates.
+const ALPHAS: [f32; DPF_ROUGHNESSES as usize] = [0.02, 0.04, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0];
+/// The least of them.
+const LEAST_ALPHA: f64 = 0.02;
 
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: "wang2020",
@@ -123,7 +128,7 @@ pub(crate) struct Wang2020 {
 /// The roughness that a material is rendered with: the paper's tables begin at .02, and below that P would be that of .02
 /// while the rest of Eq. 16 would not.
 fn alpha(material: &GlintMaterial) -> f64 {
-    material.values.number("alpha").max(dpf::LEAST_ALPHA)
+    material.values.number("alpha").max(LEAST_ALPHA)
 }
 
 /// Flakes in a square of texture space: a whole number, as a quadtree counts them.
@@ -143,7 +148,7 @@ impl Method for Wang2020 {
         if self.dpf.contains_key(&source) {
             return Ok(Vec::new());
         }
-        let (buffer, update) = dpf::precompute(source, executor, cache, progress)?;
+        let (buffer, update) = dpf::precompute(source, &ALPHAS, executor, cache, progress)?;
         self.dpf.insert(source, buffer);
         Ok(vec![update])
     }
@@ -162,7 +167,7 @@ impl Method for Wang2020 {
             source = DpfSource::Quadrature;
             self.dpf.entry(source).or_insert_with(|| {
                 g.because(format!("material {}: no directional probability table was precomputed", material.name));
-                dpf::quadrature(g)
+                dpf::quadrature(g, &ALPHAS)
             });
         }
         let Some(dpf) = self.dpf.get(&source) else { return };
@@ -189,7 +194,7 @@ impl Method for Wang2020 {
         };
         let bind = bind_glints!(
             Bind, shading, glints,
-            accumulated: &tables.accumulated,
+            accumulated: &tables.accumulated.table,
             prefiltered: &tables.prefiltered,
             nodes: &tables.nodes,
             bounds: &tables.bounds,

@@ -1,27 +1,24 @@
 //! The tables of one material, and the passes that fill them: accumulated P, prefiltered environment, quadtree.
 
-use super::dpf::{self, DpfSource};
-use super::{alpha, flakes};
+use super::{ALPHAS, alpha, flakes};
 use crate::environment_tables::EnvironmentTables;
 use crate::methods::GlintMaterial;
+use crate::methods::dpf::{Accumulated, AccumulatedKey, DpfSource};
 use crate::settings::Value;
 use mica_graph::{Buffer, Extent, Graph, Lifetime};
-use mica_shaders::{constants as c, dpf_accumulate, prefilter, prefilter_probability, quadtree};
+use mica_shaders::{constants as c, prefilter, prefilter_probability, quadtree};
 
 const PREFILTER_ENTRIES: u64 =
     (c::PREFILTER_THETA_N * c::PREFILTER_PHI_N * c::PREFILTER_THETA_O * c::PREFILTER_PHI_O) as u64;
 
-/// What an accumulated table depends on: alpha, gamma in degrees, the table it was made from.
-type AccumulatedKey = (f64, f64, DpfSource);
-/// What a prefiltered table depends on, beside that: samples. The environment is a renderer's own and does not change.
+/// What a prefiltered table depends on, beside the accumulated one: samples. The environment is a renderer's own and does not change.
 type PrefilteredKey = (AccumulatedKey, f64);
 /// What a quadtree depends on: flakes, seed, depth.
 type QuadtreeKey = (f64, f64, f64);
 
 /// The tables of one material.
 pub(super) struct Tables {
-    pub accumulated: Buffer,
-    accumulated_for: Option<AccumulatedKey>,
+    pub accumulated: Accumulated,
     pub prefiltered: Buffer,
     prefiltered_for: Option<PrefilteredKey>,
     pub nodes: Buffer,
@@ -42,8 +39,7 @@ impl Tables {
     /// Tables that the first update fills. Without an environment there is nothing to prefilter.
     pub fn new(material: &str, environment: bool) -> Self {
         Self {
-            accumulated: table("dpf_accumulated", material, u64::from(c::DPF_ENTRIES) * 4),
-            accumulated_for: None,
+            accumulated: Accumulated::new(material),
             prefiltered: table("prefilter", material, if environment { PREFILTER_ENTRIES * 16 } else { 16 }),
             prefiltered_for: None,
             nodes: table("quadtree_nodes", material, 16),
@@ -60,10 +56,7 @@ impl Tables {
         (source, dpf): (DpfSource, &Buffer),
         environment: &EnvironmentTables,
     ) {
-        let accumulated = (alpha(material), material.values.number("gamma_deg"), source);
-        if self.accumulated_for != Some(accumulated) {
-            self.accumulate(g, material, accumulated, dpf);
-        }
+        let accumulated = self.accumulated.update(g, material, alpha(material), (source, &ALPHAS, dpf));
         let prefiltered = (accumulated, material.values.number("samples"));
         if environment.present() && self.prefiltered_for != Some(prefiltered) {
             self.prefilter(g, material, prefiltered, environment);
@@ -72,31 +65,6 @@ impl Tables {
         if self.quadtree_for != Some(quadtree) {
             self.split(g, material, quadtree);
         }
-    }
-
-    fn accumulate(&mut self, g: &mut Graph, material: &GlintMaterial, key: AccumulatedKey, dpf: &Buffer) {
-        let (alpha, gamma_deg, _) = key;
-        let change = match self.accumulated_for {
-            Some((before, _, _)) if before != alpha => format!("alpha is now {alpha}"),
-            Some((_, before, _)) if before != gamma_deg => format!("gamma is now {gamma_deg} degrees"),
-            Some(_) => "the directional probability table changed".to_owned(),
-            None => format!("first frame with alpha {alpha}, gamma {gamma_deg} degrees"),
-        };
-        g.because(format!("material {}: {change}", material.name));
-        let (low, part) = dpf::bracket(alpha as f32);
-        let [first_offset, last_offset] = dpf::accumulation_offsets(gamma_deg);
-        let degrees = f64::from(last_offset - first_offset + 1);
-        let params = dpf_accumulate::Params {
-            low: low as u32 * c::DPF_ENTRIES,
-            high: (low + 1) as u32 * c::DPF_ENTRIES,
-            part,
-            first_offset,
-            last_offset,
-            scale: (gamma_deg / degrees).powi(2) as f32,
-        };
-        let bind = dpf_accumulate::Bind { dpf, accumulated: &mut self.accumulated };
-        g.pass(bind, params, Extent::line(c::DPF_ENTRIES));
-        self.accumulated_for = Some(key);
     }
 
     fn prefilter(
@@ -115,13 +83,13 @@ impl Tables {
         g.because(format!("material {}: {change}", material.name));
         let directions = c::PREFILTER_THETA_O * c::PREFILTER_PHI_O;
         let mut probability = g.buffer("prefilter_probability", u64::from(directions) * 4);
-        let bind = prefilter_probability::Bind { accumulated: &self.accumulated, probability: &mut probability };
+        let bind = prefilter_probability::Bind { accumulated: &self.accumulated.table, probability: &mut probability };
         g.pass(bind, (), Extent::line(directions));
         let params = prefilter::Params { alpha: accumulated.0 as f32, samples: samples as u32 };
         let bind = prefilter::Bind {
             environment: environment.map(),
             probability: &probability,
-            accumulated: &self.accumulated,
+            accumulated: &self.accumulated.table,
             prefiltered: &mut self.prefiltered,
         };
         let rows = c::PREFILTER_THETA_N * c::PREFILTER_PHI_N * c::PREFILTER_THETA_O;

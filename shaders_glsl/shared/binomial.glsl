@@ -1,0 +1,71 @@
+// Counts of successes, drawn by inversion: from one random word, the more the likelier success is.
+#ifndef BINOMIAL_GLSL
+#define BINOMIAL_GLSL
+
+const float INVERTED_BELOW = 16.0; // Means below this are inverted step by step, others by a corrected normal.
+const int MOST_INVERSION_STEPS = 64; // A mean of 16 stays below this but once in 1e18.
+
+// log(1 - p) for 0 <= p <= 1/2; 1 - p would lose the digits of a small p.
+float log_one_minus(float p) {
+  float s = -p / (2.0 - p);
+  float z = s * s;
+  return 2.0 * s * (1.0 + z * (1.0 / 3.0 + z * (1.0 / 5.0 + z * (1.0 / 7.0 + z * (1.0 / 9.0 + z / 11.0)))));
+}
+
+// 1 - exp(x) for x <= 0 without cancellation near 0.
+float one_minus_exp(float x) {
+  float series = 1.0 + x * (0.5 + x * (1.0 / 6.0 + x * (1.0 / 24.0 + x * (1.0 / 120.0 + x / 720.0))));
+  return x > -0.3 ? -x * series : 1.0 - exp(x);
+}
+
+// The standard normal number that is exceeded with probability v (Giles 2010, the single-precision fit).
+float normal_exceeded(float v) {
+  float w = -log(max(4.0 * v * (1.0 - v), 1e-30));
+  bool middle = w < 5.0;
+  float t = middle ? w - 2.5 : sqrt(w) - 3.0;
+  float fit = middle ? 2.81022636e-8 : -2.00214257e-4;
+  fit = fit * t + (middle ? 3.43273939e-7 : 1.00950558e-4);
+  fit = fit * t + (middle ? -3.5233877e-6 : 1.34934322e-3);
+  fit = fit * t + (middle ? -4.39150654e-6 : -3.67342844e-3);
+  fit = fit * t + (middle ? 2.1858087e-4 : 5.73950773e-3);
+  fit = fit * t + (middle ? -1.25372503e-3 : -7.6224613e-3);
+  fit = fit * t + (middle ? -4.17768164e-3 : 9.43887047e-3);
+  fit = fit * t + (middle ? 0.246640727 : 1.00167406);
+  fit = fit * t + (middle ? 1.50140941 : 2.83297682);
+  return 1.41421356 * fit * (1.0 - 2.0 * v);
+}
+
+// Binomial(n, p) for whole n. Grows with p for the same word; small words are many successes, so that rare ones keep
+// their probability. Beyond a mean of 16 the quantile by Cornish and Fisher (1938) to the second order, its variance
+// less the 1/12 that rounding adds.
+float binomial(float n, float p, uint word) {
+  bool mirrored = p > 0.5;
+  float q = mirrored ? max(1.0 - p, 0.0) : p;
+  float v = (float(mirrored ? ~word : word) + 0.5) * 2.3283064e-10;
+  float mean = n * q;
+  float count = 0.0;
+  float log_none = n * log_one_minus(q);
+  if (mean < INVERTED_BELOW) {
+    // The probabilities of `count` successes and of more.
+    float exactly = exp(log_none);
+    float tail = one_minus_exp(log_none);
+    float odds = q / (1.0 - q);
+    for (int step = 0; step < MOST_INVERSION_STEPS && v < tail && count < n; ++step) {
+      count += 1.0;
+      exactly *= odds * (n - count + 1.0) / count;
+      tail -= exactly;
+    }
+  } else {
+    float z = normal_exceeded(clamp(v, 1e-9, 0.99999994));
+    float variance = mean * (1.0 - q);
+    float skewness = (1.0 - 2.0 * q) * inversesqrt(variance);
+    float kurtosis = (1.0 - 6.0 * q * (1.0 - q)) / variance;
+    float z2 = z * z;
+    float quantile = z + (z2 - 1.0) * skewness / 6.0 + (z2 - 3.0) * z * kurtosis / 24.0
+      - (2.0 * z2 - 5.0) * z * skewness * skewness / 36.0;
+    count = clamp(floor(mean + 0.5 + sqrt(variance - 1.0 / 12.0) * quantile), 0.0, n);
+  }
+  return mirrored ? n - count : count;
+}
+
+#endif
