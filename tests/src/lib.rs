@@ -7,6 +7,8 @@ mod gpu;
 mod picture;
 pub mod shapes;
 mod tally;
+pub mod twin;
+pub mod unusual;
 
 pub use gpu::{Gpu, Shot, dpf_cache};
 pub use picture::Picture;

@@ -2,7 +2,9 @@
 
 mod atanasov;
 mod chermain;
+mod deliot_belcour;
 mod dpf;
+mod kemppinen;
 mod lobe;
 mod shopf;
 mod smooth;
@@ -98,6 +100,8 @@ methods! {
     wang_bowles::WangBowles,
     shopf::Shopf,
     chermain::Chermain,
+    deliot_belcour::DeliotBelcour,
+    kemppinen::Kemppinen,
 }
 
 /// The method of materials that name none.
