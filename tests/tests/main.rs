@@ -5,6 +5,8 @@ mod borrowed;
 mod chermain;
 mod claims;
 mod deliot_belcour;
+mod flake_queries;
+mod flakes;
 mod foreign_models;
 mod frames;
 mod heuristics;

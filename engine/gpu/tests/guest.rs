@@ -275,6 +275,49 @@ fn a_host_that_enabled_too_little_is_told_what_is_missing() {
     assert!(error.to_string().contains("99"), "{error}");
 }
 
+/// The host enables what is required and nothing that is optional: a shader with f64 or 64-bit integers is refused before
+/// the driver sees it, in one line, and others still run.
+#[test]
+fn shaders_that_need_what_the_host_has_not_enabled_are_refused() {
+    let host = Host::new();
+    let mut executor = Executor::new(host.lend()).expect("an executor");
+    let write = |kind: &str, number: &str| {
+        let glsl = format!(
+            "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+            layout(local_size_x = 64) in;
+            layout(binding = 0) writeonly buffer B0 {{ uint b0[]; }};
+            void main() {{ {kind} n = {kind}(gl_GlobalInvocationID.x) + {number}; b0[gl_GlobalInvocationID.x] = uint(n); }}"
+        );
+        compute("write", &glsl, [64, 1, 1], 0, &[(0, BindingKind::StorageBuffer, Access::StorageWrite)])
+    };
+    for (kind, number, missing) in
+        [("double", "0.5lf", Some("shaderFloat64")), ("uint64_t", "1UL", Some("shaderInt64")), ("float", "0.5", None)]
+    {
+        let shader = write(kind, number);
+        let mut graph = Graph::new();
+        let buffer = graph.buffer("buffer", 256);
+        let work = Work::Compute { shader, params: Vec::new(), groups: [1; 3] };
+        graph.push("reference", work, vec![bind(0, buffer.resource(), Access::StorageWrite)]);
+        graph.download(&buffer);
+        let commands = host.begin();
+        // SAFETY: the command buffer was just begun, and is submitted and waited for below.
+        match (unsafe { executor.record(graph, commands, Timing::Overlapped) }, missing) {
+            (Err(error), Some(missing)) => {
+                let said = error.to_string();
+                assert!(matches!(&error, Error::Unsupported { pass, .. } if pass == "reference"), "{error:?}");
+                assert!(said.contains(missing) && !said.contains('\n') && error.exit_code() == 3, "{said}");
+                host.end(commands);
+            }
+            (Ok(recorded), None) => {
+                host.end_and_submit(commands);
+                // SAFETY: the host waited for the frame.
+                unsafe { executor.finish(recorded) }.expect("the frame is finished");
+            }
+            (result, missing) => panic!("{kind}: {missing:?} is missing, and {:?}", result.err()),
+        }
+    }
+}
+
 #[test]
 fn a_host_s_buffer_is_read_and_written_in_place() {
     let host = Host::new();

@@ -121,6 +121,19 @@ impl EnvironmentTables {
         }
     }
 
+    /// The environment averaged over the cone of this half-angle about each direction; declares the pass that fills it.
+    pub fn cone(&self, g: &mut Graph, sin2_half_gamma: f64) -> Image {
+        // As fine as the map, within reason, and never so coarse that linear interpolation shows.
+        let width = self.map.extent().width.clamp(256, 1024);
+        let extent = if self.present { Extent::new(width, width / 2) } else { Extent::new(1, 1) };
+        let desc = ImageDesc::new(Format::Rgba32Float, extent);
+        let mut cone = Image::new("environment_cone", desc, Lifetime::Settings);
+        if self.present {
+            passes::environment::cone(g, &self.map, sin2_half_gamma, &mut cone);
+        }
+        cone
+    }
+
     /// The tables of the flakes' smooth limit; declares the passes that fill them.
     pub fn beckmann(&self, g: &mut Graph) -> Lobe {
         if !self.present {

@@ -4,6 +4,7 @@ mod atanasov;
 mod chermain;
 mod deliot_belcour;
 mod dpf;
+mod flakes;
 mod kemppinen;
 mod lobe;
 mod shopf;
@@ -93,6 +94,7 @@ macro_rules! methods {
 
 methods! {
     smooth::Smooth,
+    flakes::EveryFlake,
     wang2018::Wang2018,
     wang2020::Wang2020,
     atanasov::Atanasov,

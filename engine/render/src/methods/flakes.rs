@@ -1,0 +1,222 @@
+//! Jakob et al. 2014: "Discrete Stochastic Microfacet Models", flake by flake: the reference on the GPU.
+//!
+//! The model is the paper's; the flakes are those of `engine/design/0007-flake-set.md`, the same in the oracle. Each flake in
+//! the footprint is tested against each light in f64, and mirrors its own cone of the environment. Nothing is
+//! estimated, but:
+//! - F, G and h are those of the cone's centre, as in the paper;
+//! - flakes weigh 1 / (m.n), which the paper's own program leaves out;
+//! - a footprint of more than `most` flakes shows what is expected of it, which is exact in the mean and has no fluctuation;
+//! - shadowing is Smith's rational fit, for flakes as for the smooth surface.
+//!
+//! A pixel may take more loop iterations than an invocation may: the work is split over passes, each of which goes
+//! on where the last one stopped. Pixels that are finished cost hardly anything. There are as many passes as the largest footprint
+//! that is walked through may need: with one light and a million flakes a square about one for each 2,000 flakes of
+//! `most`. Needs shaderInt64 and shaderFloat64.
+
+use super::lobe::SmoothEnvironment;
+use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
+use crate::environment_tables::EnvironmentTables;
+use crate::settings::{Kind, Setting, Value};
+use mica_graph::{Buffer, Extent, Graph, Image, Lifetime};
+use mica_shaders::glints::flakes::{Bind, Params};
+use mica_shaders::{constants as c, flake_counts, types};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+pub(super) const INFO: MethodInfo = MethodInfo {
+    name: "flakes",
+    citation: "W. Jakob, M. Hasan, L.-Q. Yan, J. Lawrence, R. Ramamoorthi, S. Marschner, Discrete Stochastic Microfacet \
+               Models, ACM Transactions on Graphics 33(4), 2014",
+    summary: "The reference: every flake in the footprint is looked at, and every light tested against it.",
+    claim: Claim::Pixels,
+    mean_within: 0.01,
+    settings: &[
+        Setting {
+            key: "most",
+            unit: "flakes in the footprint",
+            kind: Kind::Integer { min: 0, max: 10_000_000 },
+            default: Value::Number(2e4),
+            meaning: "A footprint of more than this shows what is expected of it; the number of passes grows with it.",
+        },
+        Setting {
+            key: "steps",
+            unit: "steps",
+            kind: Kind::Integer { min: 100, max: c::FLAKE_STEPS_A_PASS as u64 },
+            default: Value::Number(c::FLAKE_STEPS_A_PASS as f64),
+            meaning: "What a pixel does in one pass at most; the picture does not depend on it.",
+        },
+    ],
+    ladder: &[
+        Rung { name: "most 100", set: &[("most", "100")] },
+        Rung { name: "most 2000", set: &[("most", "2000")] },
+        Rung { name: "most 20000", set: &[] },
+    ],
+};
+
+/// Flakes a leaf has on average at most.
+const FLAKES_A_LEAF: u64 = c::FLAKES_A_LEAF as u64;
+
+/// The level of the leaves of a square with `count` flakes: the first with at most [`FLAKES_A_LEAF`] a node on average.
+fn leaf_level(count: u64) -> u32 {
+    (0..).find(|level| count <= FLAKES_A_LEAF << (2 * level)).unwrap_or(0)
+}
+
+/// Flakes in a square of texture space: a whole number.
+fn flakes(material: &GlintMaterial) -> u64 {
+    material.values.number("count").round() as u64
+}
+
+/// Steps that a walk through a square footprint of `most` flakes takes, as `flake_walk_steps` reckons them.
+fn most_steps(most: f64, count: u64, tests: f64) -> f64 {
+    let level = leaf_level(count);
+    let below = f64::from(level.saturating_sub(c::FLAKE_TABLE_LEVEL));
+    let a_leaf = count as f64 / (1u64 << (2 * level)) as f64;
+    let area = most / a_leaf;
+    let side = area.sqrt();
+    let met = area + 6.0 * side + 16.0;
+    let looked_at = met * a_leaf;
+    let walked = met * if below > 0.0 { 3.0 } else { 1.0 } + (side + 3.0) * (below + 1.0);
+    let squares = most / (count as f64).max(1.0);
+    let repeated = 1.0 + squares + 2.0 * squares.sqrt();
+    let flakes = |expected: f64| expected + 6.0 * (repeated * expected).sqrt() + 16.0;
+    if most > 0.0 { walked + flakes(looked_at) + tests * flakes(most) } else { 0.0 }
+}
+
+/// The counts of the quadtree's nodes at one level, and what they were made for.
+struct Counts {
+    buffer: Buffer,
+    made_for: (u64, u32),
+}
+
+/// The environment by the flakes' cones, and the angle that it was made for.
+struct Cone {
+    image: Image,
+    gamma_deg: f64,
+}
+
+/// The method at work; tables by the material's index.
+#[derive(Default)]
+pub(crate) struct EveryFlake {
+    environment: SmoothEnvironment,
+    counts: BTreeMap<usize, Counts>,
+    cones: BTreeMap<usize, Cone>,
+}
+
+/// Parts `count` flakes level by level down to `level`.
+fn count_flakes(g: &mut Graph, name: &str, (count, seed): (u64, u32), level: u32) -> Buffer {
+    let table = |at: u32| Buffer::new(format!("flake_counts {name}"), 8 << (2 * at), Lifetime::Settings);
+    let mut counts = table(0);
+    g.upload(&mut counts, Arc::<[u8]>::from(count.to_le_bytes().as_slice()));
+    for above in 0..level {
+        let mut children = if above + 1 == level {
+            table(level)
+        } else {
+            g.buffer(format!("flake_counts {}", above + 1), 8 << (2 * (above + 1)))
+        };
+        let bind = flake_counts::Bind { parents: &counts, children: &mut children };
+        g.pass(bind, flake_counts::Params { level: above, seed }, Extent::line(1 << (2 * above)));
+        counts = children;
+    }
+    counts
+}
+
+impl Method for EveryFlake {
+    fn keep(&mut self, materials: &[GlintMaterial]) {
+        let kept = |index: &usize| materials.iter().any(|material| material.index == *index);
+        self.counts.retain(|index, _| kept(index));
+        self.cones.retain(|index, _| kept(index));
+    }
+
+    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables) {
+        self.environment.update(g, material, environment);
+        let set = (flakes(material), material.values.number("seed") as u32);
+        let before = self.counts.get(&material.index).map(|counts| counts.made_for);
+        if before != Some(set) {
+            let change = match before {
+                Some((count, _)) if count != set.0 => format!("count is now {}", Value::Number(set.0 as f64)),
+                Some(_) => format!("seed is now {}", set.1),
+                None => format!("first frame with {} flakes", Value::Number(set.0 as f64)),
+            };
+            g.because(format!("material {}: {change}", material.name));
+            let level = leaf_level(set.0).min(c::FLAKE_TABLE_LEVEL);
+            let buffer = count_flakes(g, &material.name, set, level);
+            self.counts.insert(material.index, Counts { buffer, made_for: set });
+        }
+        let gamma_deg = material.values.number("gamma_deg");
+        let before = self.cones.get(&material.index).map(|cone| cone.gamma_deg);
+        if before != Some(gamma_deg) {
+            let change = if before.is_some() { "gamma is now" } else { "first frame with gamma" };
+            g.because(format!("material {}: {change} {gamma_deg} degrees", material.name));
+            let image = environment.cone(g, material.sin2_half_gamma());
+            self.cones.insert(material.index, Cone { image, gamma_deg });
+        }
+    }
+
+    fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
+        let (Some(lobe), Some(counts), Some(cone)) =
+            (self.environment.lobe(), self.counts.get(&material.index), self.cones.get(&material.index))
+        else {
+            return;
+        };
+        let count = flakes(material);
+        let alpha = material.values.number("alpha");
+        let leaf_level = leaf_level(count);
+        let sin2 = material.sin2_half_gamma().to_bits();
+        // The environment is one test more.
+        let tests = f64::from(shading.scene.light_count) + 1.0;
+        let most_steps = most_steps(material.values.number("most"), count, tests);
+        let steps = material.values.number("steps");
+        let extent = shading.gbuffer.ids.extent();
+        let mut walkers = g.buffer("flake_walkers", extent.texels() * size_of::<types::Walker>() as u64);
+        g.fill(&mut walkers, 0);
+        let passes = (most_steps / steps).ceil().max(1.0) as u32;
+        for pass in 1..=passes {
+            let params = Params {
+                material: material.index as u32,
+                alpha: alpha as f32,
+                flakes: count as f32,
+                slope_deviation: (alpha / std::f64::consts::SQRT_2) as f32,
+                sin2_half_gamma_low: sin2 as u32,
+                sin2_half_gamma_high: (sin2 >> 32) as u32,
+                seed: material.values.number("seed") as u32,
+                leaf_level,
+                table_level: leaf_level.min(c::FLAKE_TABLE_LEVEL),
+                most_steps: most_steps as f32,
+                steps: steps as u32,
+                last: u32::from(pass == passes),
+            };
+            let bind = bind_glints!(
+                Bind, shading, glints,
+                walkers: &mut walkers,
+                prefiltered: &lobe.prefiltered,
+                albedo: &lobe.albedo,
+                environment_cone: &cone.image,
+                flake_counts: &counts.buffer,
+            );
+            g.pass(bind, params, extent);
+        }
+    }
+
+    fn finish(&self, _material: &GlintMaterial) -> Finish {
+        Finish::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn leaves_lie_where_four_flakes_share_a_node() {
+        let levels = [0, 4, 5, 16, 17, 1_000_000, 1_000_000_000_000].map(leaf_level);
+        assert_eq!(levels, [0, 0, 1, 1, 2, 9, 19]);
+        assert_eq!(levels[6] - c::FLAKE_TABLE_LEVEL, c::FLAKE_LEVELS_BELOW);
+    }
+
+    #[test]
+    fn passes_are_as_many_as_documented() {
+        let passes = (most_steps(2e4, 1_000_000, 2.0) / f64::from(c::FLAKE_STEPS_A_PASS)).ceil();
+        assert_eq!(passes, 11.0);
+        assert_eq!(most_steps(0.0, 1_000_000, 2.0), 0.0);
+    }
+}
