@@ -10,6 +10,8 @@ mod flakes;
 mod foreign_models;
 mod frames;
 mod heuristics;
+mod jakob;
+mod jakob_counts;
 mod kemppinen;
 mod occlusion;
 mod orientation;

@@ -5,7 +5,9 @@
 //! its mean: the weights of flakes that are lit together hardly differ.
 
 use crate::Condition;
+use glam::DVec3;
 use mica_oracle::OracleError;
+use mica_oracle::jakob::{facet_area, lit_share};
 use mica_oracle::lit_probability::{cone_solid_angle, lit_probability};
 use mica_oracle::microfacet::{Microfacets, Ndf, SmithFit, half_vector};
 use mica_oracle::statistics::{ChiSquare, Moments, chi_square, upper_gamma, wasserstein_1};
@@ -28,14 +30,32 @@ impl CountLaw {
     /// # Errors
     /// If the roughness is out of range or the directions have no half vector.
     pub fn of(condition: &Condition) -> Result<Self, OracleError> {
-        let facets = Microfacets::new(Ndf::Beckmann, condition.alpha, SmithFit::Rational)?;
-        let (i, o) = (condition.i(), condition.o());
-        let gamma = condition.gamma_deg.to_radians();
-        let probability = lit_probability(&facets, i, o, gamma);
+        let (facets, i, o, gamma) = asked(condition)?;
         let h = half_vector(i, o).ok_or(OracleError::TooFew { what: "directions", given: 0, needed: 1 })?;
         // The flakes' weight 1/(m.n) at the middle of those that are lit.
+        Ok(Self::with(condition, &facets, lit_probability(&facets, i, o, gamma), 1.0 / h.z))
+    }
+
+    /// The law of the flakes that a method draws. `jakob` draws them with density D / S_D and gives all the weight S_D:
+    /// fewer are lit than of flakes that are drawn from the distribution of slopes, and their mean is the same.
+    ///
+    /// # Errors
+    /// As [`CountLaw::of`].
+    pub fn of_method(name: &str, condition: &Condition) -> Result<Self, OracleError> {
+        if name != "jakob" {
+            return Self::of(condition);
+        }
+        let (facets, i, o, gamma) = asked(condition)?;
+        Ok(Self::with(condition, &facets, lit_share(&facets, i, o, gamma), facet_area(&facets)))
+    }
+
+    /// The law of flakes that are lit with this probability and have this weight.
+    fn with(condition: &Condition, facets: &Microfacets, probability: f64, weight: f64) -> Self {
+        let (i, o) = (condition.i(), condition.o());
         let shadowing = facets.g1_over_cos(i) * facets.g1_over_cos(o);
-        let mean = i.dot(h) * shadowing * probability / (h.z * cone_solid_angle(gamma));
+        // i.h = |i + o| / 2.
+        let sigma = cone_solid_angle(condition.gamma_deg.to_radians());
+        let mean = 0.5 * (i + o).length() * shadowing * probability * weight / sigma;
         let lit = condition.flakes * probability;
         let reach = 9.0 * lit.sqrt() + 12.0;
         let first = (lit - reach).max(0.0).floor();
@@ -43,7 +63,7 @@ impl CountLaw {
         // P(K <= k) = Q(k + 1, lit).
         let steps = (last - first) as usize + 1;
         let cumulative = (0..steps).map(|step| upper_gamma(first + step as f64 + 1.0, lit)).collect();
-        Ok(Self { lit, mean, cumulative, first: first as u64 })
+        Self { lit, mean, cumulative, first: first as u64 }
     }
 
     /// Flakes expected to be lit.
@@ -102,6 +122,12 @@ impl CountLaw {
     pub fn quantiles(&self, count: usize) -> Vec<f64> {
         (0..count).map(|index| self.quantile((index as f64 + 0.5) / count as f64)).collect()
     }
+}
+
+/// The flakes' distribution, the directions about the normal, the cone's half-angle in radians.
+fn asked(condition: &Condition) -> Result<(Microfacets, DVec3, DVec3, f64), OracleError> {
+    let facets = Microfacets::new(Ndf::Beckmann, condition.alpha, SmithFit::Rational)?;
+    Ok((facets, condition.i(), condition.o(), condition.gamma_deg.to_radians()))
 }
 
 /// How far a method's pixels are from the law.

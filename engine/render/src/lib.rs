@@ -16,7 +16,9 @@ mod view;
 
 pub use cache::{Cache, CacheError};
 pub use embedded::{EMBEDDED_SCENES, EmbeddedScene, embedded_scene};
-pub use methods::{COMMON_SETTINGS, Claim, DEFAULT_METHOD, GlintMaterial, METHODS, MethodInfo, Rung, method};
+pub use methods::{
+    COMMON_SETTINGS, Claim, DEFAULT_METHOD, GlintMaterial, JakobTable, METHODS, MethodInfo, Rung, method,
+};
 pub use renderer::{Environment, Frame, LeftOut, OcclusionBackend, Progress, Renderer, Update};
 pub use settings::{Kind, Setting, SettingError, Value, Values};
 pub use view::View;

@@ -5,6 +5,7 @@ mod chermain;
 mod deliot_belcour;
 mod dpf;
 mod flakes;
+mod jakob;
 mod kemppinen;
 mod lobe;
 mod shopf;
@@ -13,6 +14,8 @@ mod wang2018;
 mod wang2020;
 mod wang_bowles;
 mod zirr_kaplanyan;
+
+pub use jakob::JakobTable;
 
 use crate::environment_tables::EnvironmentTables;
 use crate::passes::GBuffer;
@@ -95,6 +98,7 @@ macro_rules! methods {
 methods! {
     smooth::Smooth,
     flakes::EveryFlake,
+    jakob::Jakob,
     wang2018::Wang2018,
     wang2020::Wang2020,
     atanasov::Atanasov,

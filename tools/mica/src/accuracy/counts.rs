@@ -108,7 +108,7 @@ fn measure(
     cache: Option<&Cache>,
     quick: bool,
 ) -> Result<Row, Failure> {
-    let law = CountLaw::of(&condition).map_err(|error| Failure::bad_input(error.to_string()))?;
+    let law = CountLaw::of_method(method.name, &condition).map_err(|error| Failure::bad_input(error.to_string()))?;
     let stage = match stage {
         Some(stage) => stage,
         none => none.insert(Stage::new(method.name, &condition)?),
