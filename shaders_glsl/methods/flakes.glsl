@@ -17,11 +17,10 @@ struct Walker {
 const uint WALK_AHEAD = 0u; // As a buffer of zeros says.
 const uint WALK_LEFT = 1u; // It goes on in the next pass.
 const uint WALK_OVER = 2u;
+const uint EXPECTED_NORMALS = 512u; // Normals that stand for infinitely many flakes under the environment.
 
 layout(std430, binding = 50) buffer Walkers { Walker walkers[]; }; // One a pixel.
-layout(binding = 51) uniform texture2DArray prefiltered; // The environment by Beckmann's lobe.
-layout(binding = 52) uniform texture2D albedo; // Directional albedo of Beckmann's lobe.
-layout(binding = 53) uniform texture2D environment_cone; // The environment by the flakes' cones.
+layout(binding = 51) uniform texture2D environment_cone; // The environment by the flakes' cones.
 layout(push_constant) uniform Params {
   uint material; // Index of the material.
   float alpha; // Roughness.
@@ -47,16 +46,30 @@ vec3 reflected(GlintSurface surface, Arrival arrival, float area) {
   return arrival.irradiance * schlick(surface.f0, i_h) * (max(i_n, 0.0) * i_h * shadowing / area);
 }
 
+// What a flake of this normal mirrors of the environment, over its weight, the flakes' number and the footprint's area.
+vec3 mirrored_environment(GlintSurface surface, vec3 m, mat3 from_local) {
+  vec3 o = surface.o;
+  vec3 facet = from_local * m;
+  float o_m = dot(o, facet);
+  vec3 r = 2.0 * o_m * facet - o;
+  float r_n = dot(r, surface.normal);
+  if (o_m <= 0.0 || r_n <= 0.0) {
+    return vec3(0.0);
+  }
+  vec2 uv = equirect_from(environment_from_scene(r));
+  vec3 light = textureLod(sampler2D(environment_cone, linear_wrap_u), uv, 0.0).rgb;
+  float shadowing = beckmann_g1_over_cosine(r_n, alpha) * r_n * beckmann_g1_over_cosine(dot(o, surface.normal), alpha);
+  return frame.environment.z * light * schlick(surface.f0, o_m) * (o_m * shadowing);
+}
+
 // What infinitely many flakes of these cones show.
 vec3 expected_radiance(GlintSurface surface, mat3 to_local, double sin2_half_gamma) {
   float solid_angle = 4.0 * PI * float(sin2_half_gamma);
   vec3 n = surface.normal;
   vec3 radiance = vec3(0.0);
-  if (frame.has_environment != 0u) {
-    vec2 factors = lobe_albedo(albedo, clamp(dot(surface.o, n), 0.0, 1.0), alpha);
-    vec3 mirrored = environment_from_scene(reflect(-surface.o, n));
-    vec3 light = prefiltered_radiance(prefiltered, mirrored, alpha);
-    radiance += frame.environment.z * light * (surface.f0 * factors.x + factors.y);
+  for (uint index = 0u; index < frame.has_environment * EXPECTED_NORMALS; ++index) {
+    vec3 m = sample_beckmann(hammersley(index, EXPECTED_NORMALS), alpha);
+    radiance += mirrored_environment(surface, m, to_local) / (m.z * float(EXPECTED_NORMALS));
   }
   for (uint index = 0u; index < frame.light_count; ++index) {
     if ((surface.shadowed >> index & 1u) == 0u) {
@@ -74,22 +87,6 @@ vec3 expected_radiance(GlintSurface surface, mat3 to_local, double sin2_half_gam
   return radiance;
 }
 
-// What a flake of this normal mirrors of the environment, over its weight, the flakes' number and the footprint's area.
-vec3 mirrored_environment(GlintSurface surface, vec3 m, mat3 from_local) {
-  vec3 o = surface.o;
-  vec3 facet = from_local * m;
-  float o_m = dot(o, facet);
-  vec3 r = 2.0 * o_m * facet - o;
-  float r_n = dot(r, surface.normal);
-  if (o_m <= 0.0 || r_n <= 0.0) {
-    return vec3(0.0);
-  }
-  vec2 uv = equirect_from(environment_from_scene(r));
-  vec3 light = textureLod(sampler2D(environment_cone, linear_wrap_u), uv, 0.0).rgb;
-  float shadowing = beckmann_g1_over_cosine(r_n, alpha) * r_n * beckmann_g1_over_cosine(dot(o, surface.normal), alpha);
-  return frame.environment.z * light * schlick(surface.f0, o_m) * (o_m * shadowing);
-}
-
 vec3 glint_radiance(GlintSurface surface) {
   uint at = gl_GlobalInvocationID.y * frame.width + gl_GlobalInvocationID.x;
   Walker walker = walkers[at];
@@ -104,6 +101,7 @@ vec3 glint_radiance(GlintSurface surface) {
   bool lit_by_environment = frame.has_environment != 0u;
   bool begins = walker.state == WALK_AHEAD;
   bool finished = walker.state == WALK_OVER;
+  bool expects = false;
 
   // Loops that run once or never: drivers that run pixels as lanes of one thread execute what is in a branch for all of
   // them, but leave a loop when the last has.
@@ -111,10 +109,8 @@ vec3 glint_radiance(GlintSurface surface) {
     float tests = float(frame.light_count) + (lit_by_environment ? 1.0 : 0.0);
     float steps_expected = flake_walk_steps(set, side_x, side_y, flakes, tests);
     // Written so that a footprint that is no number shows what is expected, too.
-    if (!(steps_expected <= most_steps) || area < 1e-30) {
-      radiance = expected_radiance(surface, from_local, sin2_half_gamma);
-      finished = true;
-    }
+    expects = !(steps_expected <= most_steps) || area < 1e-30;
+    finished = expects;
   }
   for (bool once = !finished; once; once = false) {
     vec3 towards[MAX_LIGHTS];
@@ -158,8 +154,8 @@ vec3 glint_radiance(GlintSurface surface) {
     walker.next_column = walk.next.x;
     walker.next_row = walk.next.y;
   }
-  for (bool once = !finished && last != 0u; once; once = false) {
-    // Beyond six standard deviations of what was allowed for.
+  // Beyond six standard deviations of what was allowed for, the last pass gives up.
+  for (bool once = expects || (!finished && last != 0u); once; once = false) {
     radiance = expected_radiance(surface, from_local, sin2_half_gamma);
   }
   walker.radiance = float[](radiance.x, radiance.y, radiance.z);

@@ -18,16 +18,10 @@ void main() {
   if (any(greaterThanEqual(at, size))) {
     return;
   }
-  mat3 from_axis = frame_about(direction_at((vec2(at) + 0.5) / vec2(size)));
+  vec3 axis = direction_at((vec2(at) + 0.5) / vec2(size));
   vec3 sum = vec3(0.0);
   for (uint index = 0u; index < samples; ++index) {
-    vec2 u = hammersley(index, samples);
-    // sin^2 of half the angle is uniform over a cap.
-    float sin2_half = u.x * sin2_half_gamma;
-    float sine = 2.0 * sqrt(sin2_half * (1.0 - sin2_half));
-    float azimuth = 2.0 * PI * u.y;
-    vec3 local = vec3(sine * cos(azimuth), sine * sin(azimuth), 1.0 - 2.0 * sin2_half);
-    sum += environment_radiance(from_axis * local, level);
+    sum += environment_radiance(direction_in_cone(axis, sin2_half_gamma, hammersley(index, samples)), level);
   }
   imageStore(cone, at, vec4(sum / float(samples), 1.0));
 }

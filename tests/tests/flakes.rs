@@ -169,7 +169,7 @@ fn a_furnace_shows_no_sparkle_but_the_count_s() {
     let mut gpu = Gpu::new();
     let map = Environment { map: EquirectMap::constant([1.0; 3]), rotation_radians: 0.4 };
     let areas: Vec<f64> = seen_plane(SIZE).into_iter().map(|(_, area)| area).collect();
-    for (alpha, gamma_deg) in [(0.1, 6.0), (0.3, 2.0)] {
+    for (alpha, gamma_deg, as_printed) in [(0.1, 6.0, 20.0..29.0), (0.3, 2.0, 220.0..310.0)] {
         let count = 2000.0;
         let glint = Glint { count, alpha, gamma_deg, ..Glint::default() };
         let mut excess = |method: &str, settings: &[(&str, &str)]| {
@@ -199,7 +199,7 @@ fn a_furnace_shows_no_sparkle_but_the_count_s() {
         );
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
         assert!((0.9..1.2).contains(&flakes), "{flakes}");
-        assert!(printed > 10.0, "{printed}");
+        assert!(as_printed.contains(&printed), "{printed}");
         assert!(many.pixels.iter().all(|pixel| pixel[1] <= 1.001), "no energy is made");
     }
 }

@@ -101,7 +101,8 @@ fn methods_say_where_they_come_from_and_what_they_promise() {
     for method in METHODS {
         let year = method.citation.split(|c: char| !c.is_ascii_digit()).any(|digits| digits.len() == 4);
         assert!(year && method.citation.len() > 40, "{}: {}", method.name, method.citation);
-        assert!(!method.summary.is_empty() && method.mean_within > 0.0, "{}", method.name);
+        let [least, most] = method.mean_between;
+        assert!(!method.summary.is_empty() && least <= 1.0 && most >= 1.0, "{}", method.name);
         for setting in method.settings {
             assert!(setting.meaning.ends_with('.'), "{}: {}", method.name, setting.key);
         }

@@ -22,9 +22,12 @@ pub fn methods(args: &JsonFlag) -> Result<(), Failure> {
     for method in METHODS {
         let default = if method.name == DEFAULT_METHOD { " (default)" } else { "" };
         text += &format!("{}{default}: {}\n", method.name, method.summary);
-        let within = 100.0 * method.mean_within;
-        text +=
-            &format!("  source: {}\n  claim: {}, its mean within {within} %\n", method.citation, method.claim.name());
+        let [least, most] = method.mean_between;
+        text += &format!(
+            "  source: {}\n  claim: {}, its mean {least} to {most} of the truth\n",
+            method.citation,
+            method.claim.name()
+        );
         for rung in method.ladder {
             text += &format!("  rung {}: {}\n", rung.name, rung_text(rung.set));
         }
@@ -71,7 +74,7 @@ fn as_json(method: &MethodInfo) -> Json {
         "summary": method.summary,
         "citation": method.citation,
         "claim": method.claim.name(),
-        "mean_within": method.mean_within,
+        "mean_between": method.mean_between,
         "settings": settings,
         "ladder": ladder,
     })

@@ -42,7 +42,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
                SIGGRAPH 2016 Talks",
     summary: "Descends a hierarchy over texture space and tests the normals of the flakes at its end one by one.",
     claim: Claim::Distribution,
-    mean_within: 0.01,
+    mean_between: [0.99, 1.01],
     settings: &[
         Setting {
             key: "enumerated",

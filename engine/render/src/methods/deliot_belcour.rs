@@ -45,7 +45,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
                Anisotropic Grids, Computer Graphics Forum 42(8), 2023",
     summary: "Counts lit flakes on four anisotropic grids about the footprint by gated normal numbers; constant time.",
     claim: Claim::Mean,
-    mean_within: 0.12,
+    mean_between: [0.9, 1.12],
     settings: &[
         Setting {
             key: "microfacet_roughness",

@@ -42,7 +42,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
                Glinty NDFs in Constant Time, SIGGRAPH Asia 2025",
     summary: "Visits the 32 points of an implicit 4D grid that are nearest to the footprint and the half vector.",
     claim: Claim::Mean,
-    mean_within: 0.2,
+    mean_between: [0.85, 1.03],
     settings: &[
         Setting {
             key: "ndf",

@@ -70,9 +70,9 @@ pub struct MethodInfo {
     pub summary: &'static str,
     /// What it promises.
     pub claim: Claim,
-    /// How far its mean may be from the truth, as a share of it, where the cone is narrow beside the lobe (the grid of
+    /// Least and greatest that its mean may be, over the true one, where the cone is narrow beside the lobe (the grid of
     /// `tests/tests/claims.rs`).
-    pub mean_within: f64,
+    pub mean_between: [f64; 2],
     /// Its settings beyond those that every method has.
     pub settings: &'static [Setting],
     /// From cheap to dear.

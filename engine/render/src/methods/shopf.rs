@@ -42,7 +42,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     citation: "J. Shopf, Gettin' Procedural, AMD technical talk (GDC 2010, published 2012)",
     summary: "A lattice of sparkles in space, bent by noise and moved by the eye, where a broad lobe is lit.",
     claim: Claim::Look,
-    mean_within: 1.0,
+    mean_between: [0.3, 1.5],
     settings: &[
         Setting {
             key: "share",

@@ -14,7 +14,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
                B. Walter et al., Microfacet Models for Refraction through Rough Surfaces, EGSR 2007",
     summary: "The same surface without glints: what infinitely many flakes look like.",
     claim: Claim::Mean,
-    mean_within: 0.01,
+    mean_between: [0.99, 1.01],
     settings: &[],
     ladder: &[Rung { name: "smooth", set: &[] }],
 };

@@ -40,7 +40,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
                Filterable Model, Computer Graphics Forum 37(7), 2018",
     summary: "A quadtree says how many flakes there are, a table how likely each of them is lit.",
     claim: Claim::Look,
-    mean_within: 0.1,
+    mean_between: [0.9, 1.1],
     settings: &[
         Setting {
             key: "dpf",

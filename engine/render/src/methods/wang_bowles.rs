@@ -45,7 +45,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
                Implementations 2016",
     summary: "Sparkles of a jittered grid in space, shifted by the view and multiplied by a smooth lobe.",
     claim: Claim::Look,
-    mean_within: 1.0,
+    mean_between: [0.0, 2.0],
     settings: &[
         Setting {
             key: "repaired",

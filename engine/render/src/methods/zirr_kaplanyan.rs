@@ -44,7 +44,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     citation: "T. Zirr and A. S. Kaplanyan, Real-time Rendering of Procedural Multiscale Materials, I3D 2016",
     summary: "Counts of shining flakes drawn for the cells of two grids over the footprint.",
     claim: Claim::Look,
-    mean_within: 1.0,
+    mean_between: [0.95, 1.05],
     settings: &[
         Setting {
             key: "cells",

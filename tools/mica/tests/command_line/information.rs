@@ -9,9 +9,14 @@ fn every_method_says_what_it_can_be_set_to() {
     let report = json(&succeeded(run(&["methods", "--json"])));
     assert_eq!(report["default"], "wang2020");
     let methods = report["methods"].as_array().expect("a list");
-    assert!(methods.iter().any(|method| method["name"] == "smooth"));
+    let names: Vec<&str> = methods.iter().filter_map(|method| method["name"].as_str()).collect();
+    let known = "smooth flakes jakob wang2018 wang2020 atanasov zirr_kaplanyan wang_bowles shopf chermain deliot_belcour kemppinen";
+    assert_eq!(names, known.split(' ').collect::<Vec<_>>());
     for method in methods {
         assert!(method["citation"].as_str().is_some_and(|text| !text.is_empty()));
+        let claim = method["claim"].as_str().unwrap_or_default();
+        assert!(["pixels", "distribution", "mean", "look"].contains(&claim), "{claim}");
+        assert_eq!(method["mean_between"].as_array().map(Vec::len), Some(2));
         let settings = method["settings"].as_array().expect("a list");
         for key in ["count", "alpha", "gamma_deg", "seed", "uv_scale", "color"] {
             let setting = settings.iter().find(|setting| setting["key"] == key).expect("a setting that all have");

@@ -57,7 +57,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "Slopes out of a dictionary of one-dimensional distributions, two multiplied in each cell of texture \
               space; lobes .04 alpha wide, whatever gamma is.",
     claim: Claim::Mean,
-    mean_within: 0.1,
+    mean_between: [0.95, 1.05],
     settings: &[
         Setting {
             key: "microfacet_relative_area",

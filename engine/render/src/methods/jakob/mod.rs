@@ -44,7 +44,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
                Microfacet Models, ACM Transactions on Graphics 33(4), 2014",
     summary: "Flakes counted in the footprint and the cone by a tree over place and normal, made as it is walked.",
     claim: Claim::Distribution,
-    mean_within: 0.01,
+    mean_between: [0.99, 1.01],
     settings: &[
         Setting {
             key: "epsilon",

@@ -41,7 +41,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
                Microfacets, Computer Graphics Forum 39(6), 2020",
     summary: "A prefiltered 4D table of the environment and a quadtree of flake counts, looked up at three scales.",
     claim: Claim::Look,
-    mean_within: 1.0,
+    mean_between: [0.6, 1.7],
     settings: &[
         Setting {
             key: "dpf",
