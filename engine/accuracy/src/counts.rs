@@ -7,9 +7,9 @@
 use crate::Condition;
 use glam::DVec3;
 use mica_oracle::OracleError;
-use mica_oracle::jakob::{facet_area, lit_share};
-use mica_oracle::lit_probability::{cone_solid_angle, lit_probability};
-use mica_oracle::microfacet::{Microfacets, Ndf, SmithFit, half_vector};
+use mica_oracle::cone_mean::ConeMeans;
+use mica_oracle::jakob::lit_share;
+use mica_oracle::microfacet::{Microfacets, Ndf, SmithFit};
 use mica_oracle::statistics::{ChiSquare, Moments, chi_square, upper_gamma, wasserstein_1};
 
 /// What is true of every pixel of a stage.
@@ -28,12 +28,11 @@ impl CountLaw {
     /// The law under a condition, for F = 1 and Smith's G with its rational fit, as the renderer's shaders have it.
     ///
     /// # Errors
-    /// If the roughness is out of range or the directions have no half vector.
+    /// If the roughness is out of range.
     pub fn of(condition: &Condition) -> Result<Self, OracleError> {
         let (facets, i, o, gamma) = asked(condition)?;
-        let h = half_vector(i, o).ok_or(OracleError::TooFew { what: "directions", given: 0, needed: 1 })?;
-        // The flakes' weight 1/(m.n) at the middle of those that are lit.
-        Ok(Self::with(condition, &facets, lit_probability(&facets, i, o, gamma), 1.0 / h.z))
+        let means = ConeMeans::new(&facets, i, o, gamma);
+        Ok(Self::with(condition, means.lit_probability, means.discrete))
     }
 
     /// The law of the flakes that a method draws. `jakob` draws them with density D / S_D and gives all the weight S_D:
@@ -46,16 +45,12 @@ impl CountLaw {
             return Self::of(condition);
         }
         let (facets, i, o, gamma) = asked(condition)?;
-        Ok(Self::with(condition, &facets, lit_share(&facets, i, o, gamma), facet_area(&facets)))
+        let means = ConeMeans::new(&facets, i, o, gamma);
+        Ok(Self::with(condition, lit_share(&facets, i, o, gamma), means.discrete))
     }
 
-    /// The law of flakes that are lit with this probability and have this weight.
-    fn with(condition: &Condition, facets: &Microfacets, probability: f64, weight: f64) -> Self {
-        let (i, o) = (condition.i(), condition.o());
-        let shadowing = facets.g1_over_cos(i) * facets.g1_over_cos(o);
-        // i.h = |i + o| / 2.
-        let sigma = cone_solid_angle(condition.gamma_deg.to_radians());
-        let mean = 0.5 * (i + o).length() * shadowing * probability * weight / sigma;
+    /// The law of flakes that are lit with this probability, for this mean of f(A, i, o).
+    fn with(condition: &Condition, probability: f64, mean: f64) -> Self {
         let lit = condition.flakes * probability;
         let reach = 9.0 * lit.sqrt() + 12.0;
         let first = (lit - reach).max(0.0).floor();
