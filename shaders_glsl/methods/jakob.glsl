@@ -21,6 +21,7 @@ layout(push_constant) uniform Params {
   float split_ratio; // Mean solid angle asked for over mean area asked for.
   float epsilon; // Of criterion (10).
   float weight; // Of a flake.
+  float density_integral; // Of D over the hemisphere: S_D.
   uint product; // 1 multiplies the share of places by the share of normals, each from a tree of its own.
   uint samples; // Directions drawn for the environment.
 };
@@ -33,10 +34,7 @@ vec3 environment_sample(uint index, vec3 o, out float density) {
   vec4 random = vec4(unit_from(name), unit_from(mixed(name + 1u)), unit_from(mixed(name + 2u)), unit_from(mixed(name + 3u)));
   vec3 h = sample_beckmann(random.xy, 2.0 * alpha);
   vec3 mirrored = 2.0 * dot(o, h) * h - o;
-  float fall = 2.0 * sin_half_gamma * sin_half_gamma * random.z;
-  float radius = sqrt(fall * (2.0 - fall));
-  float turn = 2.0 * PI * random.w;
-  vec3 i = frame_about(mirrored) * vec3(radius * cos(turn), radius * sin(turn), 1.0 - fall);
+  vec3 i = direction_in_cone(mirrored, sin_half_gamma * sin_half_gamma, random.zw);
   density = lit_probability(o, i, sin_half_gamma * sin_half_gamma, 2.0 * alpha) / solid_angle;
   return i;
 }
@@ -82,6 +80,12 @@ vec3 glint_radiance(GlintSurface surface) {
     JakobCone cone = JakobCone(i, o, sin_half_gamma, cos_half_gamma);
     JakobCount found = jakob_count(tree, footprint, cone, mode, steps_left / int(queries - query));
     float share = (float(found.counted) + found.expected) / all;
+    for (bool once = found.spent && mode == JAKOB_BOTH; once; once = false) {
+      // The walk told too little: what is expected of the footprint stands, of flakes with density D / S_D.
+      vec3 h = normalize(i + o);
+      float probability = lit_probability(i, o, sin_half_gamma * sin_half_gamma, alpha);
+      share = footprint.area * probability / (h.z * density_integral);
+    }
     if (places) {
       share_of_places = share;
     } else {

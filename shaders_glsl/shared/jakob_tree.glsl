@@ -71,6 +71,7 @@ JakobFootprint jakob_footprint(uint64_t flakes, vec2 corner, vec2 side_x, vec2 s
 struct JakobCount {
   uint64_t counted; // Those counted one by one or by whole nodes.
   float expected; // What is expected of nodes that were not divided further.
+  bool spent; // So few steps were left that some triangles were taken as they lay across the cone: no expectation.
 };
 
 // Whether a random word is below a chance in 2^-32, of which the largest is 1.
@@ -236,7 +237,7 @@ uint jakob_listed(uint n, uvec2 key, uvec3 square, uint triangle, uint mode, Jak
 // few of them are left, nodes are divided no further but taken at their expectation, as criterion (10) does with those
 // whose standard error is below epsilon times what is found already.
 JakobCount jakob_count(JakobTree tree, JakobFootprint footprint, JakobCone cone, uint mode, int budget) {
-  JakobCount found = JakobCount(uint64_t(0), 0.0);
+  JakobCount found = JakobCount(uint64_t(0), 0.0, false);
   uvec4 stack[JAKOB_STACK];
   uint height = 0u;
   int last_step = steps_left - budget;
@@ -259,7 +260,7 @@ JakobCount jakob_count(JakobTree tree, JakobFootprint footprint, JakobCone cone,
     if (left < reserve && !hopeless && most_flakes > JAKOB_SMOOTH) {
       // So many that they cannot be walked: all of them are expected, and nothing else.
       hopeless = true;
-      found = JakobCount(uint64_t(0), 0.0);
+      found = JakobCount(uint64_t(0), 0.0, false);
       handed_on = 0.0;
       next_tile = tiles;
       stack[0] = uvec4(0x80000000u, 0u, floatBitsToUint(most_flakes), 0u);
@@ -267,7 +268,7 @@ JakobCount jakob_count(JakobTree tree, JakobFootprint footprint, JakobCone cone,
     }
     if (height == 0u) {
       if (tile_is_inside && !has_whole) {
-        whole = JakobCount(found.counted - before.counted, found.expected - before.expected);
+        whole = JakobCount(found.counted - before.counted, found.expected - before.expected, found.spent);
         has_whole = true;
       }
       before = found;
@@ -359,6 +360,7 @@ JakobCount jakob_count(JakobTree tree, JakobFootprint footprint, JakobCone cone,
         found.expected += value;
       } else if (closing || triangle.chord_radius < JAKOB_FINE * cone.sin_half) {
         found.expected += value * share_lit;
+        found.spent = found.spent || triangle.chord_radius >= JAKOB_FINE * cone.sin_half;
       } else if (nearly_leaf) {
         vec3 weights = leaf ? jakob_corner_weights(triangle.splits) : jakob_linear_weights(triangle.splits);
         found.expected += value * jakob_share_of_leaf(triangle, cone, weights, share_lit);

@@ -181,7 +181,7 @@ fn counts_differ_once_the_tree_is_walked_wrongly() {
     for (file, from, to) in [
         ("jakob_overlap", "chord < within - MARGIN", "chord < within + 0.02"),
         ("jakob_overlap", "place + reach;", "place + 0.9 * reach;"),
-        ("jakob_tree", "(place + 0.5)", "(place + 5e4)"),
+        ("jakob_tree", "dvec2(draw(key, at), draw(key, at + 1u))", "dvec2(draw(key, at), draw(key, at))"),
         ("jakob_tree", "split.undecided - low : low", "low : split.undecided - low"),
         ("jakob_tree", "LISTED_DRAW + 64u * flake + 24u", "LISTED_DRAW + 64u * flake + 23u"),
     ] {
@@ -303,7 +303,7 @@ fn counts_over_pixels_follow_the_law_in_over_a_hundred_conditions() {
                 let law = CountLaw::of_method("jakob", &condition).expect("a law");
                 let more = CountLaw::of_method("jakob", &Condition { flakes: 1.05 * condition.flakes, ..condition });
                 let more = more.expect("a law");
-                let samples = stage.samples(gpu.executor(), &condition, 24, 3).expect("samples");
+                let samples = stage.samples(gpu.executor(), &condition, 32, 3).expect("samples");
                 fair.push(law.chi_square(&samples).expect("cells").p_value);
                 // The same flakes against a law that expects more of them: their worth stays.
                 let worth = more.mean() / more.lit() * law.lit() / law.mean();

@@ -27,7 +27,8 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     name: "flakes",
     citation: "W. Jakob, M. Hasan, L.-Q. Yan, J. Lawrence, R. Ramamoorthi, S. Marschner, Discrete Stochastic Microfacet \
                Models, ACM Transactions on Graphics 33(4), 2014",
-    summary: "The reference: every flake in the footprint is looked at, and every light tested against it.",
+    summary: "The reference: every flake in the footprint is looked at, and every light tested against it; a footprint \
+              of more than `most` flakes shows what is expected of it, without fluctuation.",
     claim: Claim::Pixels,
     mean_between: [0.99, 1.01],
     settings: &[

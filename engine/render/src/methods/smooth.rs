@@ -12,7 +12,8 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     name: "smooth",
     citation: "P. Beckmann and A. Spizzichino, The Scattering of Electromagnetic Waves from Rough Surfaces, 1963; \
                B. Walter et al., Microfacet Models for Refraction through Rough Surfaces, EGSR 2007",
-    summary: "The same surface without glints: what infinitely many flakes look like.",
+    summary: "The same surface without glints: what infinitely many flakes of narrow cones look like. The environment is \
+              a split sum, darker than the truth at grazing views (by 38 % at 83 degrees under `overcast`, alpha .3).",
     claim: Claim::Mean,
     mean_between: [0.99, 1.01],
     settings: &[],

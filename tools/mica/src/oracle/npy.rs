@@ -27,11 +27,12 @@ struct Layout {
 /// Reads the rows of a file.
 pub fn read_rows(path: &Path) -> Result<Vec<[f64; COLUMNS]>, Failure> {
     let wrong = |why: &str| Failure::bad_input(format!("{}: {why}", path.display()));
-    let file = File::open(path).map_err(|error| wrong(&format!("cannot be read: {error}")))?;
-    let found = file.metadata().map_err(|error| wrong(&error.to_string()))?;
+    // Before it is opened: a pipe would keep us waiting for a writer.
+    let found = std::fs::metadata(path).map_err(|error| wrong(&format!("cannot be read: {error}")))?;
     if !found.is_file() {
         return Err(wrong("is no file"));
     }
+    let file = File::open(path).map_err(|error| wrong(&format!("cannot be read: {error}")))?;
     rows_from(BufReader::new(file), found.len()).map_err(|why| wrong(&why))
 }
 

@@ -3,6 +3,7 @@
 use super::*;
 use std::f64::consts::PI;
 use std::fs;
+use std::process::Command;
 
 /// A NumPy file, version 1, of rows (u, v, mx, my, mz).
 fn npy(rows: &[[f64; 5]]) -> Vec<u8> {
@@ -144,6 +145,27 @@ fn answers_about_a_list_are_those_of_brute_force() {
     assert!(lit > 1000, "{lit}");
 }
 
+/// A footprint's corner belongs to it, and the next number above the flake's place is past it: queries are read to their
+/// last bit.
+#[test]
+fn a_corner_on_a_flake_is_decided_by_the_last_bit() {
+    let mut uniform = uniforms();
+    let rows: Vec<[f64; 5]> = (0..200).map(|_| [uniform(), 0.5, 0.0, 0.0, 1.0]).collect();
+    for row in &rows {
+        let question = |corner: f64| Question {
+            alpha: 0.3,
+            gamma_deg: 6.0,
+            i: [0.0, 0.0, 1.0],
+            o: [0.0, 0.0, 1.0],
+            para: [corner, 0.5, 1e-9, 0.0, 0.0, 1e-3],
+        };
+        let questions = vec![question(row[0]).json(), question(row[0].next_up()).json()];
+        let counts: Vec<Option<u64>> =
+            ask(&[*row], &questions.into()).iter().map(|answer| answer["in_area"].as_u64()).collect();
+        assert_eq!(counts, [Some(1), Some(0)], "{row:?}");
+    }
+}
+
 #[test]
 fn what_shows_no_light_is_counted_all_the_same() {
     let rows = [[0.5, 0.5, 0.0, 0.0, 2.0], [0.0, 0.25, -0.1, 0.0, 1.0]];
@@ -250,6 +272,11 @@ fn lists_and_queries_that_cannot_be_read_are_told_by_file() {
     wrong(&["--flakes", &flakes, "--queries", &queries, "--alpha", "0.3"], &["--alpha"]);
     both("missing.npy", &queries, &["missing.npy"]);
     both(folder.path().to_str().expect("a plain name"), &queries, &["is no file"]);
+    // Nobody writes into these.
+    let pipe = in_folder(folder.path(), "pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().is_ok_and(|status| status.success()));
+    both(&pipe, &queries, &["pipe", "is no file"]);
+    both(&flakes, &pipe, &["pipe", "is no file"]);
     both(&write("text.npy", b"u,v,mx,my,mz"), &queries, &["text.npy", "no NumPy"]);
     both(&write("cut.npy", &good[..good.len() - 1]), &queries, &["cut.npy", "too short"]);
     both(&write("nan.npy", &npy(&[[0.5, f64::NAN, 0.0, 0.0, 1.0]])), &queries, &["nan.npy", "flake 0", "finite"]);

@@ -23,7 +23,8 @@
 //! Decided where the paper is silent: the footprint is the pixel's parallelogram, without the plugin's limits to its shape
 //! (axes within 4 : 1, sine at least 1/4); one over more than 64 squares of texture, or over a square or more with a
 //! million flakes, shows the share of a whole square. A walk has a number of steps: when few are left, what is not walked
-//! counts as expected, and a footprint of more than 2000 flakes shows nothing but its expectation. A cut triangle that is
+//! counts as expected, and a footprint of more than 2000 flakes, or one that hardly any steps are left for (many lights, many
+//! `samples`), shows nothing but its expectation. Needs shaderInt64 and shaderFloat64. A cut triangle that is
 //! no leaf is accepted only with more than 1000 flakes: its expectation is dearer than a walk through fewer.
 
 mod triangles;
@@ -42,7 +43,8 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     name: "jakob",
     citation: "W. Jakob, M. Hasan, L.-Q. Yan, J. Lawrence, R. Ramamoorthi, S. Marschner, Discrete Stochastic \
                Microfacet Models, ACM Transactions on Graphics 33(4), 2014",
-    summary: "Flakes counted in the footprint and the cone by a tree over place and normal, made as it is walked.",
+    summary: "Flakes counted in the footprint and the cone by a tree over place and normal, made as it is walked. The \
+              distribution is that claimed with epsilon=0; the paper's .1 keeps the mean and loses variance.",
     claim: Claim::Distribution,
     mean_between: [0.99, 1.01],
     settings: &[
@@ -52,7 +54,8 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             kind: Kind::Real { min: 0.0, max: 1.0 },
             default: Value::Number(0.1),
             meaning: "A node whose standard error is at most this times the flakes found so far counts as expected \
-                      (criterion 10); 0 counts every flake.",
+                      (criterion 10); 0 counts every flake \
+                      that the steps of an invocation suffice for.",
         },
         Setting {
             key: "mean_area",
@@ -80,7 +83,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             key: "samples",
             unit: "directions",
             kind: Kind::Integer { min: 1, max: 64 },
-            default: Value::Number(4.0),
+            default: Value::Number(1.0),
             meaning: "Directions drawn for the environment in each pixel and frame.",
         },
     ],
@@ -152,6 +155,7 @@ impl Method for Jakob {
             split_ratio: (mean_solid_angle / values.number("mean_area")) as f32,
             epsilon: values.number("epsilon") as f32,
             weight: if values.flag("weighted") { table.density_integral as f32 } else { 1.0 },
+            density_integral: table.density_integral as f32,
             product: u32::from(values.flag("product")),
             samples: values.number("samples") as u32,
         };
