@@ -5,10 +5,13 @@
 
 mod gpu;
 mod picture;
+pub mod shaders;
 pub mod shapes;
+pub mod sky;
 mod tally;
 pub mod twin;
 pub mod unusual;
+pub mod values;
 
 pub use gpu::{Gpu, Shot, dpf_cache};
 pub use picture::Picture;

@@ -92,8 +92,8 @@ pub fn sphere(material: Material, rings: u32) -> Scene {
     one_mesh("sphere", mesh, material)
 }
 
-/// The point of [`plane`] that [`OVER_PLANE`] sees through the centre of each pixel, and its area in texture space: that of the
-/// parallelogram spanned by its derivatives, from central differences of the exact point.
+/// The point of [`plane`] that [`OVER_PLANE`] sees through the centre of each pixel, and its area in texture space:
+/// that of the parallelogram spanned by its derivatives, from central differences of the exact point.
 pub fn seen_plane(size: [u32; 2]) -> Vec<(DVec3, f64)> {
     let backwards = (OVER_PLANE.eye - OVER_PLANE.target).normalize();
     let right = DVec3::Y.cross(backwards).normalize();

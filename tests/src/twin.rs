@@ -1,20 +1,8 @@
-//! What f64 twins of glint shaders share: the integer hash, the pixel's footprint on the stage, the shares of an
-//! ellipse.
+//! What f64 twins of glint shaders share beside the oracle's integer hash: numbers from words, the pixel's footprint on
+//! the stage, the shares of an ellipse.
 
 use glam::{DMat2, DVec2, DVec3};
 use mica_accuracy::Condition;
-
-/// One full mixer of a word (Wellons's lowbias32).
-pub fn mixed(x: u32) -> u32 {
-    let x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
-    let x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
-    x ^ (x >> 16)
-}
-
-/// The words, hashed: the last is mixed first.
-pub fn hash(words: &[u32]) -> u32 {
-    words.iter().rev().fold(0, |chain, word| mixed(word.wrapping_add(chain)))
-}
 
 /// Inside (0, 1), from 24 bits.
 pub fn unit_from(bits: u32) -> f64 {

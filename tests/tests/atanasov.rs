@@ -1,14 +1,16 @@
-//! `atanasov` beyond its claim (`claims.rs`): all its ways of counting have one law, its flakes stay when the light moves,
-//! and a constant sky does not make them sparkle.
+//! `atanasov` beyond its claim (`claims.rs`): all its ways of counting have one law, its flakes stay when the light
+//! moves, and a constant sky does not make them sparkle.
 
 use glam::{DVec2, DVec3};
 use mica_accuracy::{Condition, CountErrors, CountLaw, Stage};
 use mica_oracle::flake_set::{FlakeSet, Footprint, is_lit};
 use mica_oracle::statistics::{Moments, Verdict, sidak};
 use mica_render::scene::{EquirectMap, Glint, Light};
-use mica_render::{Environment, OcclusionBackend, Renderer, View};
+use mica_render::{OcclusionBackend, Renderer, View};
+use mica_tests::Gpu;
 use mica_tests::shapes::{Eye, conductor, plane};
-use mica_tests::{Gpu, Picture};
+use mica_tests::sky::under_the_sky;
+use mica_tests::values::correlation;
 
 fn condition([alpha, gamma_deg]: [f64; 2], flakes: f64, [theta_i_deg, theta_o_deg, phi_deg]: [f64; 3]) -> Condition {
     Condition { alpha, gamma_deg, flakes, theta_i_deg, theta_o_deg, phi_deg }
@@ -22,11 +24,10 @@ fn samples(gpu: &mut Gpu, settings: &[(&str, &str)], condition: &Condition, side
     stage.samples(gpu.executor(), condition, side, seed).expect("samples")
 }
 
-/// Flakes tested one by one, counted by node, and the switch between the two at 1000 flakes; cones narrower and wider than
-/// the lobe, up to one that every flake is lit in; views up to 85 degrees, where a footprint is 11 times as long as wide;
-/// a half vector at 30 degrees, where weights are 1.16.
-/// Chi-square at 1e-6 with Sidak over all, and mean, variance and the share of dark pixels within five standard errors.
-/// Smallest bias caught: 6 % more flakes.
+/// Flakes tested one by one, counted by node, and the switch between the two at 1000 flakes; cones narrower and wider
+/// than the lobe, up to one that every flake is lit in; views up to 85 degrees, where a footprint is 11 times as long
+/// as wide; a half vector at 30 degrees, where weights are 1.16. Chi-square at 1e-6 with Sidak over all, and mean,
+/// variance and the share of dark pixels within five standard errors. Smallest bias caught: 6 % more flakes.
 #[test]
 fn flakes_have_one_law_however_they_are_counted() {
     const SIGNIFICANCE: f64 = 1e-6;
@@ -72,16 +73,10 @@ fn flakes_have_one_law_however_they_are_counted() {
     assert!(caught >= 4, "6 % must show: {biased:?}");
 }
 
-/// The correlation of two sets of pixels.
-pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
-    let [of_a, of_b] = [a, b].map(|values| Moments::of(values).expect("values"));
-    let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - of_a.mean) * (b - of_b.mean)).sum();
-    sum / (a.len() - 1) as f64 / (of_a.variance * of_b.variance).sqrt()
-}
-
-/// A light that moves by a tenth of the cone's radius leaves most flakes lit: the cones' common part is .936 of each, and
-/// that is the correlation of the pixels (measured: .93). Moved by more than twice the radius it lights others (measured:
-/// -.01). Counts drawn by node stay too (measured: .99). Catches flakes that are drawn anew when the light moves.
+/// A light that moves by a tenth of the cone's radius leaves most flakes lit: the cones' common part is .936 of each,
+/// and that is the correlation of the pixels (measured: .93). Moved by more than twice the radius it lights others
+/// (measured: -.01). Counts drawn by node stay too (measured: .99). Catches flakes that are drawn anew when the light
+/// moves.
 #[test]
 fn flakes_stay_when_the_light_moves() {
     let mut gpu = Gpu::new();
@@ -95,41 +90,13 @@ fn flakes_stay_when_the_light_moves() {
     }
 }
 
-/// The plane seen from straight above, every pixel alike, under a sky and no light: the mean of so many frames.
-pub(crate) fn under_the_sky(
-    gpu: &mut Gpu,
-    method: &str,
-    settings: &[(&str, &str)],
-    (map, [alpha, gamma_deg], flakes): (EquirectMap, [f64; 2], f64),
-    frames: u32,
-) -> Picture {
-    const SIDE: u32 = 64;
-    let above = Eye { eye: DVec3::new(0.3, 50.0, 0.51), target: DVec3::new(0.3, 0.0, 0.5), vertical_fov_radians: 0.02 };
-    let pixel = 2.0 * 50.0 * 0.01_f64.tan() / f64::from(SIDE);
-    let count = flakes / (pixel * pixel);
-    let glint = Glint { count, alpha, gamma_deg, color: Some([1.0; 3]), ..Glint::default() };
-    let sky = Environment { map, rotation_radians: 0.0 };
-    let scene = plane(conductor(method, glint), 8.0);
-    let mut renderer = Renderer::new(scene, &[], Some(&sky), OcclusionBackend::None).expect("the scene is sound");
-    for (key, value) in settings {
-        renderer.set(None, key, value).expect("a setting");
-    }
-    let view = above.view([SIDE; 2]);
-    let mut picture = gpu.render_sample(&mut renderer, &view, Some(0)).picture;
-    for earlier in 1..frames {
-        let next = View { sample_index: earlier, ..view.clone() };
-        picture = gpu.render_sample(&mut renderer, &next, Some(earlier)).picture;
-    }
-    picture
-}
-
 fn white() -> EquirectMap {
     EquirectMap::constant([1.0; 3])
 }
 
-/// Every flake reflects the sky wherever it is turned: what is left of sparkle is the fluctuation of the flakes' number,
-/// whether they are asked one by one or counted. Measured: variance over squared mean, times flakes, 1.01 and 1.07, and
-/// the smooth lobe's mean within .1 %. A count of flakes that are lit with probability P would give 1 / P.
+/// Every flake reflects the sky wherever it is turned: what is left of sparkle is the fluctuation of the flakes'
+/// number, whether they are asked one by one or counted. Measured: variance over squared mean, times flakes, 1.01 and
+/// 1.07, and the smooth lobe's mean within .1 %. A count of flakes that are lit with probability P would give 1 / P.
 #[test]
 fn a_constant_sky_does_not_sparkle() {
     let mut gpu = Gpu::new();
@@ -145,15 +112,16 @@ fn a_constant_sky_does_not_sparkle() {
     }
 }
 
-/// A small sun in an otherwise black map sends what a directional light would: the mean over many pixels and frames is the
-/// truth's for that direction, for both methods that draw directions, with a cone narrower than the lobe and with one that
-/// alone reaches the sun. Measured: within 2 %, most of it noise. Smallest bias caught: 7 %. Catches directions drawn without
-/// the cone, by another density, or looked up in the wrong frame.
+/// A small sun in an otherwise black map sends what a directional light would: the mean over many pixels and frames is
+/// the truth's for that direction, for both methods that draw directions, with a cone narrower than the lobe and with
+/// one that alone reaches the sun. Measured: within 3.6 %, most of it noise. Smallest bias caught: 7 % up or down.
+/// Catches directions drawn without the cone, by another density, or looked up in the wrong frame.
 #[test]
 fn a_sun_in_the_map_is_a_light() {
     const SIZE: [u32; 2] = [128, 64];
     const RADIANCE: f32 = 1000.0;
     let mut gpu = Gpu::new();
+    let mut ratios = Vec::new();
     for (material, [column, row]) in [([0.5, 3.0], [70, 14]), ([0.03, 20.0], [20, 3])] {
         let mut texels = vec![[0.0; 3]; (SIZE[0] * SIZE[1]) as usize];
         texels[(row * SIZE[0] + column) as usize] = [RADIANCE; 3];
@@ -173,13 +141,16 @@ fn a_sun_in_the_map_is_a_light() {
             let picture = under_the_sky(&mut gpu, method, settings, (map.clone(), material, flakes), frames);
             let ratio = picture.mean()[1] / expected;
             println!("{method} {flakes} flakes, {material:?}: {ratio:.4}");
-            assert!((ratio - 1.0).abs() < 0.05, "{method} {flakes} flakes, {material:?}: {ratio}");
+            ratios.push(ratio);
         }
     }
+    let right = |bias: f64| ratios.iter().all(|ratio| (bias * ratio - 1.0).abs() < 0.05);
+    assert!(right(1.0), "{ratios:?}");
+    assert!(!right(1.07) && !right(0.93), "a bias of 7 % must show: {ratios:?}");
 }
 
-/// Blending as in V-Ray: below `blend_min` flakes nothing changes, above `blend_max` every pixel is the smooth lobe's, within
-/// 1 %, and half-way the deviation is half as great.
+/// Blending as in V-Ray: below `blend_min` flakes nothing changes, above `blend_max` every pixel is the smooth lobe's,
+/// within 1 %, and half-way the deviation is half as great.
 #[test]
 fn blending_takes_the_sparkle_away() {
     let mut gpu = Gpu::new();
@@ -195,10 +166,10 @@ fn blending_takes_the_sparkle_away() {
     assert!((share - 0.5).abs() < 0.01, "{share}");
 }
 
-/// Footprints from some hundred to 1e15 flakes, up to thousands of times as long as wide and over millions of squares of
-/// texture, across which they lie diagonally: the plane towards its horizon keeps the smooth lobe's mean in every row, for both methods that descend the
-/// tree. Measured: within 5 % where flakes are few, 1 % elsewhere. Catches a traversal that runs out of steps: such pixels
-/// are black.
+/// Footprints from some hundred to 1e15 flakes, up to thousands of times as long as wide and over millions of squares
+/// of texture, across which they lie diagonally: the plane towards its horizon keeps the smooth lobe's mean in every
+/// row, for both methods that descend the tree. Measured: within 5 % where flakes are few, 1 % elsewhere. Catches a
+/// traversal that runs out of steps: such pixels are black.
 #[test]
 fn footprints_of_any_size_and_length_keep_the_mean() {
     let mut gpu = Gpu::new();
@@ -237,9 +208,9 @@ fn footprints_of_any_size_and_length_keep_the_mean() {
     }
 }
 
-/// Where flakes are tested one by one they are the flakes of the set: pixel by pixel the sum of the weights of those that the
-/// oracle finds lit, but for those that lie within f32's reach of an edge of footprint or cone. Measured: 99.0 and 97.7 % of
-/// the pixels agree; with the flakes of another seed 50 and 23 %, the dark ones mostly.
+/// Where flakes are tested one by one they are the flakes of the set: pixel by pixel the sum of the weights of those
+/// that the oracle finds lit, but for those that lie within f32's reach of an edge of footprint or cone. Measured: 99.0
+/// and 97.7 % of the pixels agree; with the flakes of another seed 50 and 23 %, the dark ones mostly.
 #[test]
 fn enumerated_flakes_are_those_of_the_set() {
     const SIDE: u32 = 64;

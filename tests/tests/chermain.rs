@@ -3,11 +3,12 @@
 use glam::DVec3;
 use mica_accuracy::{Condition, Stage};
 use mica_oracle::lit_probability::lit_probability;
-use mica_oracle::microfacet::{Microfacets, Ndf, SmithFit, half_vector};
+use mica_oracle::microfacet::half_vector;
 use mica_oracle::statistics::Moments;
 use mica_render::scene::{EquirectMap, Glint, Light, Scene};
 use mica_render::{Environment, OcclusionBackend, Renderer};
 use mica_tests::shapes::{Eye, OVER_PLANE, conductor, plane};
+use mica_tests::values::{correlation, facets, mean};
 use mica_tests::{Gpu, Picture};
 
 /// Angles from near the mirror's to beyond two standard deviations of the slopes.
@@ -31,10 +32,6 @@ fn stage(condition: &Condition, settings: &[(&str, &str)]) -> Stage {
     stage
 }
 
-fn facets(alpha: f64) -> Microfacets {
-    Microfacets::new(Ndf::Beckmann, alpha, SmithFit::Rational).expect("a roughness")
-}
-
 /// The BRDF over that of the smooth limit with Smith's shadowing, in each pixel of so many pictures of other flakes.
 fn ratios(gpu: &mut Gpu, condition: &Condition, settings: &[(&str, &str)], pictures: u32) -> Vec<Vec<f64>> {
     let mut stage = stage(condition, settings);
@@ -42,10 +39,6 @@ fn ratios(gpu: &mut Gpu, condition: &Condition, settings: &[(&str, &str)], pictu
     let expected = facets(condition.alpha).brdf(condition.i(), condition.o());
     let mut picture = |seed| stage.samples(gpu.executor(), condition, 128, seed).expect("samples");
     (0..pictures).map(|seed| picture(seed).into_iter().map(|f| f / expected).collect()).collect()
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// Mean, with its standard error, by picture: neighbouring pixels share cells.
@@ -233,13 +226,6 @@ fn rms_difference(a: &[f64], b: &[f64]) -> f64 {
     (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt()
 }
 
-fn correlation(a: &[f64], b: &[f64]) -> f64 {
-    let (mean_a, mean_b) = (mean(a), mean(b));
-    let covariance = mean(&a.iter().zip(b).map(|(a, b)| (a - mean_a) * (b - mean_b)).collect::<Vec<_>>());
-    let variance = |v: &[f64], m: f64| mean(&v.iter().map(|v| (v - m).powi(2)).collect::<Vec<_>>());
-    covariance / (variance(a, mean_a) * variance(b, mean_b)).sqrt()
-}
-
 /// Low and askew: footprints are long and lie across the axes of texture space.
 const ASKEW: Eye =
     Eye { eye: DVec3::new(5.0, 0.7, 5.0), target: DVec3::new(0.3, 0.0, 0.5), vertical_fov_radians: 0.05 };
@@ -321,8 +307,8 @@ fn cells_repeat_unless_seeded_by_both_coordinates() {
 }
 
 /// Footprints from 1e-12 to 1e6 squares wide and up to 1e4 times as long, near and far from the origin, with one flake
-/// and 10^12: nothing is negative, infinite or not a number. What covers many squares or many flakes is the smooth lobe,
-/// within .1 %.
+/// and 10^12: nothing is negative, infinite or not a number. What covers many squares or many flakes is the smooth
+/// lobe, within .1 %.
 #[test]
 fn no_footprint_is_too_small_too_large_or_too_long() {
     let mut gpu = Gpu::new();

@@ -3,18 +3,15 @@
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 use mica_accuracy::{Condition, Stage};
 use mica_graph::{Buffer, Extent, Graph, Lifetime};
+use mica_oracle::flake_set::{hash2, hash3, mixed};
 use mica_oracle::lit_probability::{cone_solid_angle, lit_probability};
-use mica_oracle::microfacet::{Microfacets, Ndf, SmithFit};
 use mica_shaders::constants::DELIOT_BELCOUR_NOISE_SIZE as SIZE;
 use mica_shaders::deliot_belcour_noise;
 use mica_tests::Gpu;
-use mica_tests::twin::{Seen, ellipse, hash, mixed, stage_pixels, unit_from, words_of};
+use mica_tests::twin::{Seen, ellipse, stage_pixels, unit_from, words_of};
 use mica_tests::unusual::{greatest_jump, panned, ratios_over_unusual_footprints};
+use mica_tests::values::facets;
 use std::f64::consts::PI;
-
-fn facets(alpha: f64) -> Microfacets {
-    Microfacets::new(Ndf::Beckmann, alpha, SmithFit::Rational).expect("a roughness")
-}
 
 /// The number that these bits are as a half float.
 fn half(bits: u32) -> f64 {
@@ -194,10 +191,10 @@ fn density(noise: &[u32], condition: &Condition, seen: &Seen, seed: u32, repaire
         } else {
             [(DVec2::ZERO, 1.0 - part.x - part.y), (DVec2::X, part.x), (DVec2::Y, part.y)]
         };
-        let grid = hash(&[level as u32, stretch as u32, hash(&[turn, seed])]);
+        let grid = hash3(level as u32, stretch as u32, hash2(turn, seed));
         for (step, share) in vertices {
             let ([xh, xl], [yh, yl]) = (words_of((base + step).x), words_of((base + step).y));
-            let key = hash(&[xh, xl, hash(&[yh, yl, grid])]);
+            let key = hash3(xh, xl, hash3(yh, yl, grid));
             let random = |index: u32| unit_from(mixed(key.wrapping_add(index)));
             let n = area * (log_density + 2.0 * probit(random(1))).clamp(if repaired { -1e9 } else { 0.0 }, 50.0).exp();
             let at = slope + f64::from(SIZE) * DVec2::new(random(2), random(3));
@@ -229,8 +226,8 @@ fn density(noise: &[u32], condition: &Condition, seen: &Seen, seed: u32, repaire
 
 /// The shader and the paper's formulas in f64, with the tetrahedron found by trying all, weights by inverse matrices
 /// and the quantile by bisection, agree in nearly all pixels; where a count is about to change, f32 may fall on the
-/// other side. Measured on lavapipe: within .5 % in half of the pixels and 2.2 % in nine of ten. Smallest change
-/// caught: 5 %.
+/// other side. Measured on lavapipe: within .5 % in half of the pixels and 2.2 % in nine of ten. Smallest bias caught:
+/// 5 % up or down, in every setting but at 87 degrees, where most pixels are dark: 12 %.
 #[test]
 fn every_pixel_is_the_papers_formula_in_f64() {
     let mut gpu = Gpu::new();
@@ -251,19 +248,28 @@ fn every_pixel_is_the_papers_formula_in_f64() {
         stage.set("density_randomization", "2").expect("a setting");
         let samples = stage.samples(gpu.executor(), &condition, 16, 7).expect("samples");
         let lobe = facets(alpha);
-        let mut errors: Vec<f64> = stage_pixels(&condition, 16)
+        // What each pixel should be, and what an error is measured against.
+        let expected: Vec<[f64; 2]> = stage_pixels(&condition, 16)
             .iter()
-            .zip(&samples)
-            .map(|(seen, sample)| {
+            .map(|seen| {
                 let [i, o] = [seen.i, seen.o].map(|v| DVec3::new(v.x, -v.z, v.y));
                 let scale = lobe.g1_over_cos(i) * lobe.g1_over_cos(o) / 4.0;
                 let expected = scale * density(&noise, &condition, seen, 7, repaired);
-                (sample - expected).abs() / (expected + 0.01 * scale * lobe.d((i + o).normalize()))
+                [expected, expected + 0.01 * scale * lobe.d((i + o).normalize())]
             })
             .collect();
-        errors.sort_by(f64::total_cmp);
-        println!("{condition:?}: median {:.1e}, 90 % {:.1e}, worst {:.1e}", errors[128], errors[230], errors[255]);
-        assert!(errors[230] < 0.05 && errors[128] < 0.02, "{condition:?}: {} {}", errors[128], errors[230]);
+        let errors = |bias: f64| {
+            let pairs = samples.iter().zip(&expected);
+            let mut errors: Vec<f64> = pairs.map(|(f, [expected, unit])| (bias * f - expected).abs() / unit).collect();
+            errors.sort_by(f64::total_cmp);
+            [errors[128], errors[230], errors[255]]
+        };
+        let right = |[median, most, _]: [f64; 3]| most < 0.05 && median < 0.02;
+        println!("{condition:?}: median, 90 % and worst {:.4?}", errors(1.0));
+        assert!(right(errors(1.0)), "{condition:?}: {:?}", errors(1.0));
+        let bias = if theta_o_deg > 85.0 { 0.12 } else { 0.05 };
+        let biased = [errors(1.0 + bias), errors(1.0 - bias)];
+        assert!(!biased.into_iter().any(right), "{condition:?}: a bias of {bias} must show: {biased:?}");
     }
 }
 

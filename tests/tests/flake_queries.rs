@@ -2,75 +2,14 @@
 //! and a light lights.
 
 use glam::{DVec2, DVec3};
-use mica_graph::{
-    Access, Binding, BindingKind, Buffer, Extent, Graph, Lifetime, Shader, Slot, Stage, StageCode, Stages, Use, Work,
-};
+use mica_graph::{Access, Buffer, Extent, Graph, Lifetime, Shader};
 use mica_oracle::flake_set::{self, FlakeSet, Footprint, is_lit};
 use mica_shaders::{constants as c, flake_counts};
 use mica_tests::Gpu;
+use mica_tests::shaders::{Change, filled, push_pass, test_shader};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
-use std::path::Path;
-use std::process::Command;
-
-const GROUP: u32 = 64;
-
-/// A pass of one of these tests' shaders; `accesses` are its buffers, by binding.
-fn shader(file: &'static str, change: (&str, &str), accesses: &[(u32, Access)], params_bytes: u32) -> &'static Shader {
-    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let shaders = package.join("../shaders_glsl");
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let (from, to) = change;
-    let changed = "shared/flakes_in_footprint.glsl";
-    let source = std::fs::read_to_string(shaders.join(changed)).expect("the shader's source");
-    assert!(source.contains(from), "{changed} no longer says {from:?}: change this test with it");
-    std::fs::create_dir(folder.path().join("shared")).expect("a folder");
-    std::fs::write(folder.path().join(changed), source.replacen(from, to, 1)).expect("its copy");
-    let output = folder.path().join("shader.spv");
-    let tool = std::env::var_os("GLSLANG_VALIDATOR").unwrap_or_else(|| "glslangValidator".into());
-    let include = |path: &Path| format!("-I{}", path.display());
-    let done = Command::new(tool)
-        .args(["--target-env", "vulkan1.2", &include(folder.path()), &include(&shaders), "-o"])
-        .args([output.as_path(), &package.join("tests").join(file)])
-        .output()
-        .expect("glslangValidator runs (Debian: glslang-tools)");
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stdout));
-    let spirv: Vec<u32> = bytemuck::pod_collect_to_vec(&std::fs::read(output).expect("its output"));
-    let binding = |&(slot, access): &(u32, Access)| Binding {
-        name: "buffer",
-        slot,
-        kind: BindingKind::StorageBuffer,
-        access,
-        stages: Stages::COMPUTE,
-    };
-    // Shaders are statics in the program; a test's live as long as its process.
-    Box::leak(Box::new(Shader {
-        name: file,
-        variant: "",
-        stages: vec![StageCode { stage: Stage::Compute, spirv: spirv.leak() }].leak(),
-        group: [GROUP, 1, 1],
-        bindings: accesses.iter().map(binding).collect::<Vec<_>>().leak(),
-        params_bytes,
-        outputs: &[],
-    }))
-}
-
-fn uses(buffers: &[(u32, &Buffer, Access)]) -> Vec<Use> {
-    let one = |&(slot, buffer, access): &(u32, &Buffer, Access)| Use {
-        resource: buffer.resource().clone(),
-        slot: Slot::Binding(slot),
-        access,
-        stages: Stages::COMPUTE,
-    };
-    buffers.iter().map(one).collect()
-}
-
-fn filled(graph: &mut Graph, name: &str, bytes: &[u8]) -> Buffer {
-    let mut buffer = graph.buffer(name, bytes.len() as u64);
-    graph.upload(&mut buffer, bytes);
-    buffer
-}
 
 /// What `flake_words.comp` makes of four words.
 #[repr(C)]
@@ -122,13 +61,11 @@ fn flakes_are_made_alike_on_both_sides() {
         })
         .collect();
     let access = [(30, Access::StorageRead), (31, Access::StorageWrite)];
-    let shader = shader("flake_words.comp", ("", ""), &access, 0);
+    let shader = test_shader("flake_words.comp", None, &access, 0);
     let mut graph = Graph::new();
     let from = filled(&mut graph, "words", bytemuck::cast_slice(&words));
     let made = graph.buffer("made", (words.len() * size_of::<Made>()) as u64);
-    let groups = [(words.len() as u32).div_ceil(GROUP), 1, 1];
-    let work = Work::Compute { shader, params: Vec::new(), groups };
-    graph.push("words", work, uses(&[(30, &from, access[0].1), (31, &made, access[1].1)]));
+    push_pass(&mut graph, shader, &[], words.len(), &[(30, &from, access[0].1), (31, &made, access[1].1)]);
     let made: Vec<Made> = bytemuck::pod_collect_to_vec(&gpu.run(graph, &[&made])[0]);
     for (words, made) in words.iter().zip(&made) {
         assert_eq!(*made, Made::by_the_oracle(*words), "{words:x?}");
@@ -254,18 +191,17 @@ fn answers(gpu: &mut Gpu, shader: &'static Shader, set: Set, queries: &[Query], 
     let deviation = (set.alpha / 2.0_f64.sqrt()) as f32;
     let params = [set.seed, leaf_level, table_level, (set.count as f32).to_bits(), deviation.to_bits(), steps];
     for _ in 0..PASSES {
-        let groups = [(queries.len() as u32).div_ceil(GROUP), 1, 1];
-        let work = Work::Compute { shader, params: bytemuck::cast_slice(&params).to_vec(), groups };
         let read = Access::StorageRead;
         let buffers = [(55, &counts, read), (30, &asked, read), (31, &answers, Access::StorageReadWrite)];
-        graph.push("queries", work, uses(&buffers));
+        push_pass(&mut graph, shader, &params, queries.len(), &buffers);
     }
     bytemuck::pod_collect_to_vec(&gpu.run(graph, &[&answers])[0])
 }
 
-fn query_shader(change: (&str, &str)) -> &'static Shader {
+fn query_shader(change: Option<(&str, &str)>) -> &'static Shader {
     let accesses = [(55, Access::StorageRead), (30, Access::StorageRead), (31, Access::StorageReadWrite)];
-    shader("flake_queries.comp", change, &accesses, 24)
+    let change = change.map(|(from, to)| Change { file: "shared/flakes_in_footprint.glsl", from, to });
+    test_shader("flake_queries.comp", change, &accesses, 24)
 }
 
 /// Flakes a square, from none to the most there can be, and about every change of how they are counted.
@@ -297,13 +233,14 @@ const COUNTS: [u64; 25] = [
     1_000_000_000_000,
 ];
 
-/// More than a million queries over flakes from none to 10^12 a square, UVs to 10^6 either way, footprints of 0 to 2,000
-/// flakes, round and up to 10^12 times as long as wide, turned either way, without area, larger than the square: all counts are
-/// equal (46.6 million flakes inside, 2 million of them lit), no walk runs out of passes, and none takes more steps than are allowed for.
+/// More than a million queries over flakes from none to 10^12 a square, UVs to 10^6 either way, footprints of 0 to
+/// 2,000 flakes, round and up to 10^12 times as long as wide, turned either way, without area, larger than the square:
+/// all counts are equal (46.6 million flakes inside, 2 million of them lit), no walk runs out of passes, and none takes
+/// more steps than are allowed for.
 #[test]
 fn a_million_counts_equal_the_oracle_s() {
     let mut gpu = Gpu::new();
-    let shader = query_shader(("", ""));
+    let shader = query_shader(None);
     let (mut asked, mut found, mut lit, mut most, mut resumed) = (0usize, 0u64, 0u64, 0, 0usize);
     for (index, count) in COUNTS.into_iter().enumerate() {
         let set = Set { count, alpha: [0.05, 0.1, 0.3, 0.5, 1.0][index % 5], seed: 77 * index as u32 };
@@ -327,16 +264,16 @@ fn a_million_counts_equal_the_oracle_s() {
     assert!(asked > 1_000_000 && found > 20_000_000 && lit > 200_000 && most > 1_900 && resumed > 10);
 }
 
-/// How a walk is cut into passes changes nothing, and the counts above would show positions rounded to f32, edges that are open
-/// on the wrong side by 2^-30 of a leaf, and a cone wider by one part in a thousand.
+/// How a walk is cut into passes changes nothing, and the counts above would show positions rounded to f32, edges that
+/// are open on the wrong side by 2^-30 of a leaf, and a cone wider by one part in a thousand.
 #[test]
 fn counts_depend_on_every_bit_and_on_nothing_else() {
     let mut gpu = Gpu::new();
     let set = Set { count: 1_000_000, alpha: 0.3, seed: 5 };
     let queries = queries(set, 20_000);
     let counts = |answers: &[Answer]| -> Vec<(u32, u32)> { answers.iter().map(|a| (a.inside, a.lit)).collect() };
-    let exact = answers(&mut gpu, query_shader(("", "")), set, &queries, 7000);
-    let in_parts = answers(&mut gpu, query_shader(("", "")), set, &queries, 4500);
+    let exact = answers(&mut gpu, query_shader(None), set, &queries, 7000);
+    let in_parts = answers(&mut gpu, query_shader(None), set, &queries, 4500);
     assert!(in_parts.iter().all(|answer| answer.over == 1));
     assert_eq!(counts(&exact), counts(&in_parts));
     for change in [
@@ -344,7 +281,7 @@ fn counts_depend_on_every_bit_and_on_nothing_else() {
         ("low >= 0.0lf && high < 0.0lf", "low >= 1e-6lf * -high && high < 0.0lf"),
         ("<= 4.0lf * sin2_half_gamma", "<= 4.004lf * sin2_half_gamma"),
     ] {
-        let wrong = answers(&mut gpu, query_shader(change), set, &queries, 7000);
+        let wrong = answers(&mut gpu, query_shader(Some(change)), set, &queries, 7000);
         let differing = counts(&exact).iter().zip(counts(&wrong)).filter(|(a, b)| **a != *b).count();
         println!("{change:?}: {differing} of {} counts differ", queries.len());
         assert!(differing > 0, "{change:?}");

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 /// Where the package assimp-testmodels keeps its glTF 2.0 files.
 const FOLDER: &str = "/usr/share/assimp/models/glTF2";
-/// How many of them can be drawn: the others are broken on purpose, ask for what is refused by name, or hold no triangle.
+/// How many of them can be drawn: the others are broken on purpose, ask for what is refused by name, or hold no
+/// triangle.
 const LEAST: usize = 20;
 
 fn models(folder: &Path, found: &mut Vec<PathBuf>) {

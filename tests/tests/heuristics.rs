@@ -1,5 +1,5 @@
-//! The real-time heuristics `zirr_kaplanyan`, `wang_bowles` and `shopf` where numbers run out: every pixel of every picture is
-//! finite and not negative.
+//! The real-time heuristics `zirr_kaplanyan`, `wang_bowles` and `shopf` where numbers run out: every pixel of every
+//! picture is finite and not negative.
 
 use glam::DVec3;
 use mica_render::scene::{EquirectMap, Glint, Light, Scene};
@@ -75,8 +75,8 @@ fn views_along_the_axes_from_near_and_far_are_sound() {
     }
 }
 
-/// Texture coordinates of 1e-12 to 1e6 a pixel, to a million squares from the origin; the least and the greatest numbers of
-/// flakes, roughnesses and cones.
+/// Texture coordinates of 1e-12 to 1e6 a pixel, to a million squares from the origin; the least and the greatest
+/// numbers of flakes, roughnesses and cones.
 #[test]
 fn extreme_textures_and_materials_are_sound() {
     let mut gpu = Gpu::new();

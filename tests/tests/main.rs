@@ -15,6 +15,7 @@ mod jakob_counts;
 mod kemppinen;
 mod occlusion;
 mod orientation;
+mod precise;
 mod settings;
 mod shopf;
 mod smooth;

@@ -40,8 +40,8 @@ fn meets_roof(point: DVec3, direction: DVec3) -> Option<bool> {
     (beyond.abs() > EDGE).then_some(beyond < 0.0)
 }
 
-/// Fails unless the pixels of `with` are black in `channel` where the roof is in the way from the seen point, and those of
-/// `without` elsewhere.
+/// Fails unless the pixels of `with` are black in `channel` where the roof is in the way from the seen point, and those
+/// of `without` elsewhere.
 fn is_black_where_hidden(with: &Picture, without: &Picture, channel: usize, hidden: impl Fn(DVec3) -> Option<bool>) {
     let (mut black, mut bright) = (0, 0);
     for (pixel, (point, _)) in seen_plane(SIZE).into_iter().enumerate() {

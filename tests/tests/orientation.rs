@@ -138,8 +138,8 @@ fn as_seen_from(world: &Mesh, world_from_local: DMat3) -> Mesh {
     mesh
 }
 
-/// Catches normals carried as if they were directions, normals and tangent frames that turn inside out in a mirror, front
-/// and back taken for each other there, and rays that leave on the wrong side.
+/// Catches normals carried as if they were directions, normals and tangent frames that turn inside out in a mirror,
+/// front and back taken for each other there, and rays that leave on the wrong side.
 #[test]
 fn a_placed_mesh_looks_like_the_mesh_it_stands_for() {
     let mut gpu = Gpu::new();
@@ -189,9 +189,9 @@ fn plane_with_uv_signs(material: Material, signs: [f32; 2]) -> Scene {
     scene
 }
 
-/// Red leans towards +u and green towards -v (glTF: green up), whichever way the texture lies on the surface: the picture
-/// is that of a plane with such normals at its vertices. Catches green taken downwards, a handedness that is ignored or
-/// applied to the tangent, and a scale that is applied to z.
+/// Red leans towards +u and green towards -v (glTF: green up), whichever way the texture lies on the surface: the
+/// picture is that of a plane with such normals at its vertices. Catches green taken downwards, a handedness that is
+/// ignored or applied to the tangent, and a scale that is applied to z.
 #[test]
 fn mapped_normals_lean_along_the_texture() {
     let mut gpu = Gpu::new();
@@ -240,8 +240,8 @@ fn plane_with_sets(material: Material, uv_set: u32, decoy: bool) -> Scene {
     scene
 }
 
-/// Textures, the holes that they cut and flakes lie in the set of texture coordinates that the material names. Catches the
-/// first set used for all, and derivatives of one set with coordinates of the other.
+/// Textures, the holes that they cut and flakes lie in the set of texture coordinates that the material names. Catches
+/// the first set used for all, and derivatives of one set with coordinates of the other.
 #[test]
 fn textures_and_flakes_lie_in_the_set_they_name() {
     let mut gpu = Gpu::new();

@@ -87,8 +87,8 @@ fn agrees_with_the_oracle(shape: Shape, scene: fn(mica_render::scene::Material) 
             let elsewhere = hits.iter().zip(&truth.hit).filter(|(a, b)| a != b).count();
             let (rms, most) = pixel_errors(&picture, &truth);
             println!(
-                "{shape:?} alpha {alpha} {lighting:?}: mean off by {:.2e}, pixels by {rms:.2e} rms, {most:.2e} at most; \
-                 {elsewhere} of {} pixels hit by one only",
+                "{shape:?} alpha {alpha} {lighting:?}: mean off by {:.2e}, pixels by {rms:.2e} rms, \
+                 {most:.2e} at most; {elsewhere} of {} pixels hit by one only",
                 worst(mean, expected),
                 hits.len(),
             );

@@ -95,8 +95,8 @@ fn up_to_a_thousand_flakes_none_is_lost() {
     }
 }
 
-/// Above 1000 flakes each child is rounded on its own (Jakob et al. 2014, section 5.2), so that a split changes the total
-/// by a number of variance 1/3 whose mean is 0: a fault of the published method, small and kept.
+/// Above 1000 flakes each child is rounded on its own (Jakob et al. 2014, section 5.2), so that a split changes the
+/// total by a number of variance 1/3 whose mean is 0: a fault of the published method, small and kept.
 #[test]
 fn above_a_thousand_flakes_the_total_drifts_as_published() {
     let mut gpu = Gpu::new();

@@ -3,12 +3,13 @@
 use glam::DVec3;
 use mica_oracle::image::smooth_image;
 use mica_oracle::lit_probability::{cone_solid_angle, lit_probability};
-use mica_oracle::microfacet::{Conductor, Microfacets, Ndf, SmithFit};
+use mica_oracle::microfacet::Conductor;
 use mica_oracle::scene::{Lights, PointLight, Shape, Size};
 use mica_oracle::wang2020::reflected_weight;
 use mica_render::scene::{EquirectMap, Glint, Light};
 use mica_render::{Environment, OcclusionBackend, Renderer};
 use mica_tests::shapes::{Eye, OVER_PLANE, conductor, plane, seen_plane};
+use mica_tests::values::facets;
 use mica_tests::{Gpu, Picture};
 
 const SIZE: [u32; 2] = [160, 90];
@@ -32,10 +33,6 @@ fn renderer(gpu: &mut Gpu, glint: Glint, sky: bool, settings: &[(&str, &str)]) -
     renderer
 }
 
-fn facets(alpha: f64) -> Microfacets {
-    Microfacets::new(Ndf::Beckmann, alpha, SmithFit::Rational).expect("a valid roughness")
-}
-
 /// Relative errors of the green channel where the expected value is at least 1e-3 of the greatest.
 fn errors(picture: &Picture, expected: &[f64]) -> Vec<f64> {
     let greatest = expected.iter().copied().fold(0.0, f64::max);
@@ -49,8 +46,8 @@ fn rms(errors: &[f64]) -> f64 {
 
 /// Eq. 21 at the largest scale, pixel by pixel: irradiance times M times P over the cone, without and with the cosine
 /// that the paper leaves out. At alpha .4 and gamma 1 degree the table needs neither interpolation between roughnesses
-/// nor accumulation. Measured on lavapipe: 0.3 % rms, 1.6 % at most, from the table's linear look-up and the half floats
-/// of F0. Smallest bias caught: 1 %.
+/// nor accumulation. Measured on lavapipe: 0.3 % rms, 1.6 % at most, from the table's linear look-up and the half
+/// floats of F0. Smallest bias caught: 1 %.
 #[test]
 fn many_flakes_under_a_point_light_are_equation_21() {
     let mut gpu = Gpu::new();
@@ -83,9 +80,8 @@ fn many_flakes_under_a_point_light_are_equation_21() {
     }
 }
 
-/// The same flakes seen at each of the three scales have the same mean: they differ in noise alone. A footprint holds 70
-/// to 1400 flakes. Smallest bias caught: 1 % at the second scale, 10 % at the first; measured:
-/// 0.05 % and 4 %.
+/// The same flakes seen at each of the three scales have the same mean: they differ in noise alone. A footprint holds
+/// 70 to 1400 flakes. Smallest bias caught: 1 % at the second scale, 10 % at the first; measured: 0.05 % and 4 %.
 #[test]
 fn the_three_scales_have_one_mean() {
     let mut gpu = Gpu::new();
@@ -201,8 +197,8 @@ fn its_limit_is_as_far_from_the_smooth_surface_as_documented() {
 }
 
 /// Cones of any size have one mean to first order, as P is the share of the lobe that they cover and sigma their size.
-/// Catches a gamma that is rounded to whole degrees in one of the two only: 1.5 degrees would be 1.8 times too bright, and
-/// half a degree 4 times.
+/// Catches a gamma that is rounded to whole degrees in one of the two only: 1.5 degrees would be 1.8 times too bright,
+/// and half a degree 4 times.
 #[test]
 fn gamma_spreads_light_without_adding_any() {
     let mut gpu = Gpu::new();
@@ -218,9 +214,9 @@ fn gamma_spreads_light_without_adding_any() {
     }
 }
 
-/// The 36 x 9 directions of Eq. 17 all miss the narrowest lobe when it is seen head-on, so that P-hat is next to nothing:
-/// flakes tested one by one are all out, as published, but the two scales that do not test them need no P-hat. Catches
-/// its use there.
+/// The 36 x 9 directions of Eq. 17 all miss the narrowest lobe when it is seen head-on, so that P-hat is next to
+/// nothing: flakes tested one by one are all out, as published, but the two scales that do not test them need no P-hat.
+/// Catches its use there.
 #[test]
 fn the_narrowest_lobe_is_not_black() {
     let mut gpu = Gpu::new();

@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 use mica_accuracy::{Condition, Stage};
-use mica_oracle::microfacet::{Microfacets, Ndf, SmithFit};
 use mica_render::scene::{Glint, Light};
 use mica_render::{OcclusionBackend, Renderer};
 use mica_tests::shapes::{Eye, OVER_PLANE, conductor, plane, seen_plane};
+use mica_tests::values::{facets, mean};
 use mica_tests::{Gpu, Picture};
 
 const SIZE: [u32; 2] = [96, 54];
@@ -30,12 +30,8 @@ fn sparkles(gpu: &mut Gpu, eye: &Eye, size: [u32; 2], settings: &[(&str, &str)])
     pairs.map(|(pixel, smooth)| f64::from(pixel[1]) / f64::from(smooth[1])).collect()
 }
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
-/// The printed level is 0 nearer than 3.33 units: nothing sparkles there, and beyond it something does. Repaired, there are
-/// sparkles on both sides. The view sees the plane from 2.7 to 6.2 units away.
+/// The printed level is 0 nearer than 3.33 units: nothing sparkles there, and beyond it something does. Repaired, there
+/// are sparkles on both sides. The view sees the plane from 2.7 to 6.2 units away.
 #[test]
 fn as_printed_nothing_nearer_than_three_and_a_third_units_sparkles() {
     let mut gpu = Gpu::new();
@@ -73,8 +69,9 @@ fn as_printed_the_view_along_the_normal_is_a_hole() {
     }
 }
 
-/// Where every component of the level times the view is whole, as straight down at level 3, the printed shift is 0/0: the middle
-/// of the picture never sparkles, though sparkles need not be round. Repaired, the view itself shifts the grid.
+/// Where every component of the level times the view is whole, as straight down at level 3, the printed shift is 0/0:
+/// the middle of the picture never sparkles, though sparkles need not be round. Repaired, the view itself shifts the
+/// grid.
 #[test]
 fn as_printed_a_whole_view_is_a_hole() {
     let mut gpu = Gpu::new();
@@ -96,9 +93,10 @@ fn as_printed_a_whole_view_is_a_hole() {
     assert!(greatest > 0.3, "{greatest}");
 }
 
-/// One grid and a plane along it: the mean is 0 to 2 times the smooth lobe, by where the plane cuts the grid. Eight grids cut in
-/// as many places have the smooth lobe's mean; where sparkles reach past their cell, the printed ones are cut and darker.
-/// Measured on lavapipe: within .6 % of it, and .65 to .77 of it cut. Smallest bias caught: 3 %.
+/// One grid and a plane along it: the mean is 0 to 2 times the smooth lobe, by where the plane cuts the grid. Eight
+/// grids cut in as many places have the smooth lobe's mean; where sparkles reach past their cell, the printed ones are
+/// cut and darker. Measured on lavapipe: within .6 % of it, and .65 to .77 of it cut. Smallest bias caught: 3 % up or
+/// down.
 #[test]
 fn the_mean_over_the_phases_of_the_grid_is_the_smooth_lobe() {
     let mut gpu = Gpu::new();
@@ -111,8 +109,7 @@ fn the_mean_over_the_phases_of_the_grid_is_the_smooth_lobe() {
         for (theta_i_deg, theta_o_deg) in [(10.0, 25.0), (30.0, 50.0)] {
             let condition =
                 Condition { alpha: 0.5, gamma_deg: 6.0, flakes: 1e5, theta_i_deg, theta_o_deg, phi_deg: 0.0 };
-            let facets = Microfacets::new(Ndf::Beckmann, 0.5, SmithFit::Rational).expect("a roughness");
-            let smooth = facets.brdf(condition.i(), condition.o());
+            let smooth = facets(0.5).brdf(condition.i(), condition.o());
             let mut stage = Stage::new("wang_bowles", &condition).expect("a stage");
             // Cells of 3 to 5 pixels: the camera is 500 metres away.
             for (key, value) in [("repaired", repaired), ("unit", "1"), ("scale", "6000"), ("sparkle_size", size)] {
@@ -131,14 +128,17 @@ fn the_mean_over_the_phases_of_the_grid_is_the_smooth_lobe() {
                 "repaired {repaired}, size {size}, {theta_i_deg} {theta_o_deg}: one grid {least:.3} to {most:.3}, \
                  eight {eight:.3}"
             );
-            assert!((eight - expected).abs() < tolerance, "{eight}");
+            let right = |bias: f64| (bias * eight - expected).abs() < tolerance;
+            assert!(right(1.0), "{eight}");
+            assert!(expected < 1.0 || (!right(1.03) && !right(0.97)), "a bias of 3 % must show: {eight}");
             assert!(most < 2.1, "{most}");
         }
     }
 }
 
-/// Where fewer flakes are lit than a cell's face holds sparkles, cells stay empty in proportion, and what sparkles is brighter
-/// by as much. Measured on lavapipe: a fifth as many within 3 %, the mean within 5 %. Smallest bias caught: 10 % and 15 %.
+/// Where fewer flakes are lit than a cell's face holds sparkles, cells stay empty in proportion, and what sparkles is
+/// brighter by as much. Measured on lavapipe: a fifth as many within 3 %, the mean within 5 %. Smallest bias caught: 12
+/// % and 17 %, up or down.
 #[test]
 fn fewer_flakes_than_cells_leave_cells_empty() {
     let mut gpu = Gpu::new();
@@ -164,8 +164,12 @@ fn fewer_flakes_than_cells_leave_cells_empty() {
     };
     let (all, few) = (of(&full), of(&sparse));
     println!("{:.4} and {:.4} of the places in a grid sparkle, with means {:.4} and {:.4}", all.0, few.0, all.1, few.1);
-    assert!((few.0 / all.0 / 0.2 - 1.0).abs() < 0.07, "{few:?} {all:?}");
-    assert!((few.1 / all.1 - 1.0).abs() < 0.1, "{few:?} {all:?}");
+    let number = |bias: f64| (bias * few.0 / all.0 / 0.2 - 1.0).abs() < 0.07;
+    assert!(number(1.0), "{few:?} {all:?}");
+    assert!(!number(1.12) && !number(0.88), "12 % more or fewer must show: {few:?} {all:?}");
+    let brightness = |bias: f64| (bias * few.1 / all.1 - 1.0).abs() < 0.1;
+    assert!(brightness(1.0), "{few:?} {all:?}");
+    assert!(!brightness(1.17) && !brightness(0.83), "a bias of 17 % must show: {few:?} {all:?}");
 }
 
 /// Whether the step that the method declares, fract of the view's shift, is near for a view along `o` at this distance.
@@ -179,9 +183,9 @@ fn near_a_step(o: DVec3, units_away: f64) -> bool {
     })
 }
 
-/// A camera that moves by 1e-4 changes no pixel by more than .25 of the smooth lobe, but at declared steps; sparkles are up
-/// to 38 times as bright as it. Measured on lavapipe: .08 at most, and .003 at the step of the level at 16.67 units, where
-/// the printed ones change by up to 19.
+/// A camera that moves by 1e-4 changes no pixel by more than .25 of the smooth lobe, but at declared steps; sparkles
+/// are up to 38 times as bright as it. Measured on lavapipe: .08 at most, and .003 at the step of the level at 16.67
+/// units, where the printed ones change by up to 19.
 #[test]
 fn repaired_sparkles_change_smoothly_with_the_camera() {
     let mut gpu = Gpu::new();
