@@ -28,6 +28,8 @@ layout(push_constant) uniform Params {
 
 const float ENUMERATING_STEPS = 5000.0; // What testing flakes one by one may take on average.
 const float COUNTING_STEPS = 600.0; // What a traversal that only counts may take on average.
+const float LIGHTS_AT_FULL_DEPTH = 4.0; // With more lights a traversal that counts is shorter by as much.
+const int STEPS_KEPT = 2000; // Of `steps_left`, to end the traversal with: what comes after counts as expected.
 const uint FIRST_COUNT_DRAW = 0x40000000u; // A node's words from here on count its lit flakes, one for each light.
 
 Footprint covered;
@@ -38,7 +40,8 @@ bool enumerated;
 vec3 directions[MAX_LIGHTS]; // Towards the lights, about n = +Z; zero where there is no light to reflect.
 float probabilities[MAX_LIGHTS]; // That a flake is lit.
 float lit[MAX_LIGHTS]; // Weights of the lit flakes, added up.
-float counted = 0.0; // Flakes of the footprint that were not tested one by one.
+float counted = 0.0; // Flakes of the footprint that were not tested one by one,
+float undrawn = 0.0; // and those among them that no draw was left for.
 vec3 reflected = vec3(0.0); // What the flakes reflect of the environment, added up.
 
 // What a flake with this normal and weight reflects of the environment, but for the division by a N: its cone is entered by
@@ -83,16 +86,25 @@ void test_flakes(FlakeNode node, uvec2 key) {
 }
 
 // How many flakes of a node are lit: a draw for each light from the law of their number, given the node's. A part of a
-// node holds a flake with the probability of its share.
+// node holds a flake with the probability of its share. Draws are loops: once their steps are spent, of further nodes as
+// many flakes are lit as expected, so that many bright lights lose fluctuation and not light.
 void count_flakes(FlakeNode node, uvec2 key) {
   float share = share_of(node, covered);
   float count = float(node.flakes);
   counted += share * count;
+  if (steps_left <= STEPS_KEPT) {
+    undrawn += share * count;
+    return;
+  }
+  float steps = float(frame.light_count);
   for (uint light = 0u; light < frame.light_count; ++light) {
     if (probabilities[light] > 0.0) {
-      lit[light] += binomial(count, share * probabilities[light], draw(key, FIRST_COUNT_DRAW + light));
+      float probability = share * probabilities[light];
+      steps += binomial_steps(count, probability);
+      lit[light] += binomial(count, probability, draw(key, FIRST_COUNT_DRAW + light));
     }
   }
+  steps_left -= int(ceil(steps));
 }
 
 void visit(FlakeNode node) {
@@ -131,9 +143,10 @@ vec3 glint_radiance(GlintSurface surface) {
   float steps = steps_to(covered, leaf_level) + expected * float(1u + frame.light_count);
   uint end = leaf_level;
   if (!(expected <= enumerated_below && steps <= ENUMERATING_STEPS)) {
-    end = level_within(covered, leaf_level, COUNTING_STEPS);
+    float of_lights = min(LIGHTS_AT_FULL_DEPTH / float(max(frame.light_count, 1u)), 1.0);
+    end = level_within(covered, leaf_level, COUNTING_STEPS * of_lights);
   }
-  enumerated = end == leaf_level;
+  enumerated = end == leaf_level && steps <= ENUMERATING_STEPS;
   bool macro = !(steps_to(covered, 0u) <= COUNTING_STEPS);
 
   for (uint light = 0u; light < frame.light_count; ++light) {
@@ -163,7 +176,7 @@ vec3 glint_radiance(GlintSurface surface) {
       float i_h = half_vector_cosine(i, o);
       // Flakes that are only counted have, to the first order in gamma, the weight 1 / (h.n).
       float weight = 2.0 * i_h / (i.z + o.z);
-      float share = lit[light] * (enumerated ? 1.0 : weight) * per_flake;
+      float share = (enumerated ? lit[light] : (lit[light] + undrawn * probabilities[light]) * weight) * per_flake;
       if (macro && smooth_share < 1.0) {
         // Every square holds the same flakes.
         uint word = draw(node_key(0u, 0u, 0u, seed), FIRST_COUNT_DRAW + light);

@@ -24,6 +24,7 @@ layout(push_constant) uniform Params {
   float density_integral; // Of D over the hemisphere: S_D.
   uint product; // 1 multiplies the share of places by the share of normals, each from a tree of its own.
   uint samples; // Directions drawn for the environment.
+  uint steps; // For all walks of a pixel.
 };
 
 // A direction from which the environment is asked: a normal of twice the roughness reflects o, and the flakes' cone blurs
@@ -40,6 +41,7 @@ vec3 environment_sample(uint index, vec3 o, out float density) {
 }
 
 vec3 glint_radiance(GlintSurface surface) {
+  steps_left = int(steps);
   mat3 to_local = frame_about(surface.normal);
   vec3 o = surface.o * to_local;
   vec2 within = surface.uv - floor(surface.uv);

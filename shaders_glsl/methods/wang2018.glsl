@@ -24,7 +24,7 @@ layout(push_constant) uniform Params {
   float expectation_above; // More lit flakes than this in a leaf are not drawn, but expected.
   uint samples; // Directions drawn from the environment.
   uint closed_form; // 1: P by quadrature, and not by the table.
-  uint linear_lookup; // 1: linear between the table's entries with azimuths folded, and not the nearest.
+  uint interpolated; // 1: linear between the table's entries with azimuths folded, and not the nearest.
   uint weighted; // 1: flakes have the weight 1 / (h.n).
 };
 
@@ -40,7 +40,8 @@ uint sources; // Lights first.
 float probabilities[MAX_SOURCES]; // That a flake is lit.
 uint bins[MAX_SOURCES]; // The directions in whole degrees, hashed.
 float lit[MAX_SOURCES]; // Flakes that are lit.
-int draws_left = 4000; // Loop iterations left for acceptance; after them lit flakes are expected.
+int draws_left = 4000; // Loop iterations left for acceptance,
+float undrawn = 0.0; // and the flakes of the leaves that came after: those of them that are lit are expected.
 
 // The table as the authors' program reads it: the nearest entry, without a look at where a row of 360 columns ends: half a
 // degree before a full turn it is the first entry of the next row.
@@ -62,7 +63,7 @@ float probability_of(vec3 i, vec3 o) {
   if (closed_form == 1u) {
     return lit_probability(i, o, sin2_half_gamma, alpha);
   }
-  return linear_lookup == 1u ? accumulated_probability(i, o) : nearest_probability(i, o);
+  return interpolated == 1u ? accumulated_probability(i, o) : nearest_probability(i, o);
 }
 
 // The degree in which each angle of the two directions lies.
@@ -76,11 +77,16 @@ void visit(FlakeNode node) {
   uvec2 key = node_key(node.level, node.cell.x, node.cell.y, seed);
   float share = share_of(node, covered);
   float count = float(node.flakes);
+  if (draws_left <= 0) {
+    undrawn += share * count;
+    return;
+  }
+  float steps = 0.0;
   for (uint source = 0u; source < sources && share > 0.0; ++source) {
-    --draws_left;
+    steps += 1.0;
     float probability = probabilities[source];
     float mean = share * count * probability;
-    if (mean > expectation_above || draws_left <= 0) {
+    if (mean > expectation_above) {
       lit[source] += mean;
       continue;
     }
@@ -88,16 +94,17 @@ void visit(FlakeNode node) {
     float accepted = 0.0;
     if (count > MOST_PARTICLES) {
       // The same law in one draw.
-      draws_left -= int(mean);
+      steps += binomial_steps(count, probability);
       accepted = probability > 0.0 ? binomial(count, probability, word) : 0.0;
     } else {
+      steps += count;
       for (uint particle = 0u; particle < uint(count); ++particle) {
-        --draws_left;
         accepted += float(hash(particle, word)) * 2.3283064e-10 < probability ? 1.0 : 0.0;
       }
     }
     lit[source] += share * accepted;
   }
+  draws_left -= int(ceil(steps));
 }
 
 vec3 glint_radiance(GlintSurface surface) {
@@ -151,7 +158,8 @@ vec3 glint_radiance(GlintSurface surface) {
   }
   vec3 radiance = vec3(0.0);
   for (uint source = 0u; source < sources; ++source) {
-    radiance += each[source] * (traversed ? lit[source] / expected : probabilities[source]);
+    float share = (lit[source] + undrawn * probabilities[source]) / expected;
+    radiance += each[source] * (traversed ? share : probabilities[source]);
   }
   return radiance;
 }

@@ -35,6 +35,12 @@ float normal_exceeded(float v) {
   return 1.41421356 * fit * (1.0 - 2.0 * v);
 }
 
+// Loop iterations that `binomial` takes on average.
+float binomial_steps(float n, float p) {
+  float mean = n * min(p, max(1.0 - p, 0.0));
+  return mean < INVERTED_BELOW ? mean : 0.0;
+}
+
 // Binomial(n, p) for whole n. Grows with p for the same word; small words are many successes, so that rare ones keep
 // their probability. Beyond a mean of 16 the quantile by Cornish and Fisher (1938) to the second order, its variance
 // less the 1/12 that rounding adds.

@@ -6,7 +6,7 @@
 #include "shared/footprint.glsl"
 #include "shared/glint_surface.glsl"
 
-const uint MAX_TREE_LEVEL = 20u; // Nodes are named by 32-bit hashes; leaves of 1e12 flakes are on level 19.
+const uint TREE_LEVELS = 20u; // The deepest is level 19, that of the leaves of 1e12 flakes.
 
 // A parallelogram in texture space, moved by whole squares so that its middle lies in the first one.
 struct Footprint {
@@ -93,7 +93,7 @@ void visit_touched(Footprint footprint, uint64_t root, uint end, uint seed) {
   uvec2 span = uvec2(ivec2(floor(footprint.high)) - first) + 1u;
   uint squares = span.x * span.y;
   // The flakes of the children of the nodes that were split, by the latter's level.
-  u64vec4 children[MAX_TREE_LEVEL];
+  u64vec4 children[TREE_LEVELS];
   uint square = 0u;
   uint level = 0u;
   uvec2 cell = uvec2(0u);

@@ -19,6 +19,7 @@ const uint JAKOB_MANY = 1000u; // A large triangle's expectation is dearer than 
 const float JAKOB_SMOOTH = 2000.0; // With more flakes than this in it, a footprint that cannot be walked shows its expectation.
 const int JAKOB_RESERVE = 2000; // Steps that are kept, at most, for what is left to be expected.
 const float JAKOB_FINE = 0.02; // A triangle so much smaller than the cone is cut by it as by a straight line.
+const uint JAKOB_STEPS = 7000u; // That an invocation may take at most.
 const uint JAKOB_STACK = 112u; // Three nodes for each of 19 + 15 levels, and the last one's children.
 const float JAKOB_MOST_TILES = 64.0; // A footprint over more squares than this shows the share of a whole one,
 const float JAKOB_MANY_FLAKES = 1e6; // and so does one of a square's area or more with more flakes than this.
@@ -29,7 +30,7 @@ const uint LISTED_DRAW = 1024u;
 
 // Steps left to this invocation. One driver ends an invocation silently after 65,535 loop iterations, and counts those of
 // eight invocations that run as one vector together: the longest of them at every step.
-int steps_left = 7000;
+int steps_left = int(JAKOB_STEPS);
 
 struct JakobTree {
   uint64_t flakes; // In a square of texture space.

@@ -81,7 +81,7 @@ fn methods_that_claim_the_distribution_have_it() {
             let law = CountLaw::of_method(method.name, &condition).expect("a law");
             let more =
                 CountLaw::of_method(method.name, &Condition { flakes: 1.06 * flakes, ..condition }).expect("a law");
-            let samples = samples(&mut gpu, method, &condition, 96, &[("epsilon", "0")]);
+            let samples = samples(&mut gpu, method, &condition, 96, &[("epsilon", "0"), ("steps", "7000")]);
             let errors = CountErrors::of(&law, &samples).expect("errors");
             let none = law.probability_of_none();
             let none_allowed = 5.0 * (none * (1.0 - none) / samples.len() as f64).sqrt() + 1e-3;

@@ -117,7 +117,7 @@ fn the_picture_does_not_depend_on_how_it_is_split_into_passes() {
         let mut renderer = renderer("flakes", glint, true, Some(&map));
         let most = ("most", "500");
         let whole = shown(&mut gpu, &mut renderer, &[most]);
-        let in_parts = shown(&mut gpu, &mut renderer, &[most, ("steps", "400")]);
+        let in_parts = shown(&mut gpu, &mut renderer, &[most, ("steps", "1000")]);
         assert!(whole.differing(&in_parts).is_empty(), "{count}");
         let smooth = shown(&mut gpu, &mut renderer, &[("most", "0")]);
         let same = whole.pixels.len() - whole.differing(&smooth).len();

@@ -280,7 +280,8 @@ fn condition(material: (f64, f64), lit: f64, [theta_i_deg, theta_o_deg, phi_deg]
 
 fn stage(condition: &Condition, set: &[(&str, &str)]) -> Stage {
     let mut stage = Stage::new("jakob", condition).expect("a stage");
-    for (key, value) in set {
+    // As many steps as there can be: what is tested here is the count, not what stands for it.
+    for (key, value) in [("steps", "7000")].iter().chain(set) {
         stage.set(key, value).expect("a setting");
     }
     stage

@@ -105,8 +105,11 @@ pub(crate) const REQUIREMENTS: DeviceRequirements = DeviceRequirements {
         },
     ],
     optional_features: &[
-        FeatureRequirement { feature: Feature::Int64, why: "counts of flakes beyond 2^32 in the reference methods" },
-        FeatureRequirement { feature: Feature::Float64, why: "exact tests of flakes in the reference methods" },
+        FeatureRequirement {
+            feature: Feature::Int64,
+            why: "whole counts of flakes in flakes, jakob, atanasov and wang2018",
+        },
+        FeatureRequirement { feature: Feature::Float64, why: "exact tests of flakes in flakes and jakob" },
     ],
     device_extensions: &[],
     optional_instance_extensions: &["VK_EXT_debug_utils"],

@@ -411,7 +411,7 @@ fn unrendered(scene: &Scene) -> Vec<(&'static str, String)> {
 
 /// Whether there is anything to glint: at least one flake in a square of texture space.
 fn glints(material: &GlintMaterial) -> bool {
-    material.values.number("count").round() > 0.0
+    material.flakes() > 0
 }
 
 /// The scene's glinting materials, with the settings that its file gives them.

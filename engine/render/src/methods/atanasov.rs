@@ -24,16 +24,19 @@
 //!   light moves, so that counts change by ones; the neighbouring pixel's part of the same node uses it too, so that
 //!   neighbours are a little alike. Counts keep their law, but the flakes are no longer those of the reference: hence the
 //!   claim;
+//! - with more than 4 lights that traversal is shorter by as much, and when its draws have taken the invocation's steps, what
+//!   is left of it counts as expected: hundreds of lit flakes under dozens of lights lose part of their variance;
 //! - a footprint over hundreds of squares of texture draws the lit flakes of one square and repeats them;
 //! - blending to the smooth lobe is off unless asked for: it takes away the variance that is left there.
 //!
 //! Left out: GGX and triplanar mapping (flakes are Beckmann's and lie in texture space here), flakes of several colours.
+//!
+//! Needs shaderInt64.
 
-use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
+use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints, leaf_level};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Graph, Image};
-use mica_shaders::constants::FLAKES_A_LEAF;
 use mica_shaders::glints::atanasov::{Bind, Params};
 
 pub(super) const INFO: MethodInfo = MethodInfo {
@@ -87,18 +90,13 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 #[derive(Default)]
 pub(crate) struct Atanasov;
 
-/// The first level on which nodes hold [`FLAKES_A_LEAF`] flakes or fewer on average.
-pub(super) fn leaf_level(flakes: u64) -> u32 {
-    (0..).find(|level| flakes <= u64::from(FLAKES_A_LEAF) << (2 * level)).unwrap_or(0)
-}
-
 impl Method for Atanasov {
     fn update(&mut self, _g: &mut Graph, _material: &GlintMaterial, _environment: &mut EnvironmentTables) {}
 
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
         let values = &material.values;
         let alpha = values.number("alpha");
-        let flakes = values.number("count").round() as u64;
+        let flakes = material.flakes();
         let params = Params {
             material: material.index as u32,
             alpha: alpha as f32,
@@ -116,21 +114,5 @@ impl Method for Atanasov {
         };
         let bind = bind_glints!(Bind, shading, glints, environment: shading.environment);
         g.pass(bind, params, shading.gbuffer.ids.extent());
-    }
-
-    fn finish(&self, _material: &GlintMaterial) -> Finish {
-        Finish::default()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::leaf_level;
-
-    #[test]
-    fn leaves_hold_a_few_flakes() {
-        for (flakes, level) in [(0, 0), (4, 0), (5, 1), (16, 1), (17, 2), (1_000_000, 9), (1_000_000_000_000, 19)] {
-            assert_eq!(leaf_level(flakes), level, "{flakes}");
-        }
     }
 }

@@ -30,7 +30,7 @@
 //! the density by exp(2 z), which `density_randomization=2` does with the mean density that `count` says.
 
 use super::lobe::SmoothEnvironment;
-use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
+use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Buffer, Extent, Graph, Image, Lifetime};
@@ -139,7 +139,7 @@ impl Method for DeliotBelcour {
             normals: normals(alpha) as f32,
             peak: peak(alpha) as f32,
             microfacet_roughness: values.number("microfacet_roughness") as f32,
-            log_density: (values.number("count").round().ln() - 0.5 * randomization * randomization) as f32,
+            log_density: ((material.flakes() as f64).ln() - 0.5 * randomization * randomization) as f32,
             density_randomization: randomization as f32,
             screen_space_scale: values.number("screen_space_scale") as f32,
             seed: values.number("seed") as u32,
@@ -152,10 +152,6 @@ impl Method for DeliotBelcour {
             noise: noise,
         );
         g.pass(bind, params, shading.gbuffer.ids.extent());
-    }
-
-    fn finish(&self, _material: &GlintMaterial) -> Finish {
-        Finish::default()
     }
 }
 

@@ -12,9 +12,10 @@
 //! A pixel may take more loop iterations than an invocation may: the work is split over passes, each of which goes
 //! on where the last one stopped. Pixels that are finished cost hardly anything. There are as many passes as the largest footprint
 //! that is walked through may need: with one light and a million flakes a square about one for each 2,000 flakes of
-//! `most`. Needs shaderInt64 and shaderFloat64.
+//! `most` (3,300 for the largest `most` in the smallest `steps`), and never more than 4,000: where these do not suffice, as
+//! under many lights, the largest footprints show what is expected of them. Needs shaderInt64 and shaderFloat64.
 
-use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
+use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints, leaf_level};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Buffer, Extent, Graph, Image, Lifetime};
@@ -35,14 +36,14 @@ pub(super) const INFO: MethodInfo = MethodInfo {
         Setting {
             key: "most",
             unit: "flakes in the footprint",
-            kind: Kind::Integer { min: 0, max: 10_000_000 },
+            kind: Kind::Integer { min: 0, max: 1_000_000 },
             default: Value::Number(2e4),
             meaning: "A footprint of more than this shows what is expected of it; the number of passes grows with it.",
         },
         Setting {
             key: "steps",
             unit: "steps",
-            kind: Kind::Integer { min: 100, max: c::FLAKE_STEPS_A_PASS as u64 },
+            kind: Kind::Integer { min: 1000, max: c::FLAKE_STEPS_A_PASS as u64 },
             default: Value::Number(c::FLAKE_STEPS_A_PASS as f64),
             meaning: "What a pixel does in one pass at most; the picture does not depend on it.",
         },
@@ -54,18 +55,8 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     ],
 };
 
-/// Flakes a leaf has on average at most.
-const FLAKES_A_LEAF: u64 = c::FLAKES_A_LEAF as u64;
-
-/// The level of the leaves of a square with `count` flakes: the first with at most [`FLAKES_A_LEAF`] a node on average.
-fn leaf_level(count: u64) -> u32 {
-    (0..).find(|level| count <= FLAKES_A_LEAF << (2 * level)).unwrap_or(0)
-}
-
-/// Flakes in a square of texture space: a whole number.
-fn flakes(material: &GlintMaterial) -> u64 {
-    material.values.number("count").round() as u64
-}
+/// Passes that the walk is split into at most.
+const MOST_PASSES: f64 = 4000.0;
 
 /// Steps that a walk through a square footprint of `most` flakes takes, as `flake_walk_steps` reckons them.
 fn most_steps(most: f64, count: u64, tests: f64) -> f64 {
@@ -128,7 +119,7 @@ impl Method for EveryFlake {
     }
 
     fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables) {
-        let set = (flakes(material), material.values.number("seed") as u32);
+        let set = (material.flakes(), material.values.number("seed") as u32);
         let before = self.counts.get(&material.index).map(|counts| counts.made_for);
         if before != Some(set) {
             let change = match before {
@@ -155,14 +146,14 @@ impl Method for EveryFlake {
         let (Some(counts), Some(cone)) = (self.counts.get(&material.index), self.cones.get(&material.index)) else {
             return;
         };
-        let count = flakes(material);
+        let count = material.flakes();
         let alpha = material.values.number("alpha");
         let leaf_level = leaf_level(count);
         let sin2 = material.sin2_half_gamma().to_bits();
         // The environment is one test more.
         let tests = f64::from(shading.scene.light_count) + 1.0;
-        let most_steps = most_steps(material.values.number("most"), count, tests);
         let steps = material.values.number("steps");
+        let most_steps = most_steps(material.values.number("most"), count, tests).min(MOST_PASSES * steps);
         let extent = shading.gbuffer.ids.extent();
         let mut walkers = g.buffer("flake_walkers", extent.texels() * size_of::<types::Walker>() as u64);
         g.fill(&mut walkers, 0);
@@ -191,10 +182,6 @@ impl Method for EveryFlake {
             g.pass(bind, params, extent);
         }
     }
-
-    fn finish(&self, _material: &GlintMaterial) -> Finish {
-        Finish::default()
-    }
 }
 
 #[cfg(test)]
@@ -202,16 +189,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn leaves_lie_where_four_flakes_share_a_node() {
-        let levels = [0, 4, 5, 16, 17, 1_000_000, 1_000_000_000_000].map(leaf_level);
-        assert_eq!(levels, [0, 0, 1, 1, 2, 9, 19]);
-        assert_eq!(levels[6] - c::FLAKE_TABLE_LEVEL, c::FLAKE_LEVELS_BELOW);
+    fn the_levels_below_the_table_reach_all_leaves() {
+        assert_eq!(leaf_level(1_000_000_000_000) - c::FLAKE_TABLE_LEVEL, c::FLAKE_LEVELS_BELOW);
     }
 
     #[test]
     fn passes_are_as_many_as_documented() {
         let passes = (most_steps(2e4, 1_000_000, 2.0) / f64::from(c::FLAKE_STEPS_A_PASS)).ceil();
         assert_eq!(passes, 11.0);
+        let passes = (most_steps(1e6, 1_000_000, 2.0) / 1000.0).ceil();
+        assert!((3300.0..3320.0).contains(&passes), "{passes}");
         assert_eq!(most_steps(0.0, 1_000_000, 2.0), 0.0);
     }
 }

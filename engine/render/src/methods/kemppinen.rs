@@ -30,7 +30,7 @@
 //! alpha_g^2 = (1 - cos gamma) sqrt(den) / (32 i.h). `alpha_g` sets it as printed instead.
 
 use super::lobe::SmoothEnvironment;
-use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
+use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Graph, Image};
@@ -96,7 +96,7 @@ impl Method for Kemppinen {
             alpha: values.number("alpha") as f32,
             solid_angle: material.solid_angle() as f32,
             alpha_g: values.number("alpha_g") as f32,
-            root_count: values.number("count").round().sqrt() as f32,
+            root_count: (material.flakes() as f64).sqrt() as f32,
             filter_width: values.number("filter_width") as f32,
             seed: values.number("seed") as u32,
             ggx: u32::from(values.word("ndf") == "ggx"),
@@ -104,9 +104,5 @@ impl Method for Kemppinen {
         };
         let bind = bind_glints!(Bind, shading, glints, prefiltered: &lobe.prefiltered, albedo: &lobe.albedo);
         g.pass(bind, params, shading.gbuffer.ids.extent());
-    }
-
-    fn finish(&self, _material: &GlintMaterial) -> Finish {
-        Finish::default()
     }
 }

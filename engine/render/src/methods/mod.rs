@@ -24,6 +24,7 @@ use crate::settings::{Kind, Setting, SettingError, Value, Values};
 use crate::{Cache, Progress, RenderError, Update};
 use mica_gpu::Executor;
 use mica_graph::{Buffer, Graph, Image};
+use mica_shaders::constants::FLAKES_A_LEAF;
 
 /// What a method promises of its pictures; the tests hold it to this.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -195,6 +196,11 @@ pub struct GlintMaterial {
 }
 
 impl GlintMaterial {
+    /// Flakes in a square of texture space: a whole number, N.
+    pub(crate) fn flakes(&self) -> u64 {
+        self.values.number("count").round() as u64
+    }
+
     /// sin^2(gamma/2), of which 1 - cos gamma is twice: computed in f64, as f32 loses it for small angles.
     pub(crate) fn sin2_half_gamma(&self) -> f64 {
         (0.5 * self.values.number("gamma_deg").to_radians()).sin().powi(2)
@@ -209,8 +215,13 @@ impl GlintMaterial {
     /// cone's solid angle times D(n) / 4 is the probability, while the cone is narrower than the lobe.
     pub(crate) fn lit_at_most(&self) -> f64 {
         let alpha = self.values.number("alpha");
-        self.values.number("count") * (self.sin2_half_gamma() / (alpha * alpha)).min(1.0)
+        self.flakes() as f64 * (self.sin2_half_gamma() / (alpha * alpha)).min(1.0)
     }
+}
+
+/// The first level of the flakes' quadtree on which nodes hold [`FLAKES_A_LEAF`] flakes or fewer on average: its leaves.
+pub(crate) fn leaf_level(flakes: u64) -> u32 {
+    (0..).find(|level| flakes <= u64::from(FLAKES_A_LEAF) << (2 * level)).unwrap_or(0)
 }
 
 /// What a method may read when it shades.
@@ -268,7 +279,9 @@ pub(crate) trait Method {
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image);
 
     /// What is to happen to the shaded glints.
-    fn finish(&self, material: &GlintMaterial) -> Finish;
+    fn finish(&self, _material: &GlintMaterial) -> Finish {
+        Finish::default()
+    }
 }
 
 /// What a method asks for after shading.
@@ -280,4 +293,15 @@ pub(crate) struct Finish {
     pub visibility_blur: i32,
     /// Taps on each side of the centre of the glints' blur.
     pub glint_blur: i32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::leaf_level;
+
+    #[test]
+    fn leaves_lie_where_four_flakes_share_a_node() {
+        let levels = [0, 1, 4, 5, 16, 17, 1_000_000, 1_000_000_000_000].map(leaf_level);
+        assert_eq!(levels, [0, 0, 0, 1, 1, 2, 9, 19]);
+    }
 }

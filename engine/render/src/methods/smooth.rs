@@ -3,7 +3,7 @@
 //! The environment's part is a split sum (Karis 2013): exact in the lobe's albedo, approximate in the lobe's shape.
 
 use super::lobe::SmoothEnvironment;
-use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
+use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
 use mica_graph::{Graph, Image};
 use mica_shaders::glints::smooth::{Bind, Params};
@@ -37,9 +37,5 @@ impl Method for Smooth {
         let bind = bind_glints!(Bind, shading, glints, prefiltered: &lobe.prefiltered, albedo: &lobe.albedo);
         // Its own name: it shares the frame of the glints' shader, but there are no glints.
         g.pass_named(INFO.name, bind, params, shading.gbuffer.ids.extent());
-    }
-
-    fn finish(&self, _material: &GlintMaterial) -> Finish {
-        Finish::default()
     }
 }

@@ -22,10 +22,13 @@
 //! the material's own roughness, accumulated as in `wang2020` (round(gamma) entries an axis). The paper filters the DPF
 //! and the environment into directional levels for indirect light: here `samples` directions are drawn in each pixel and
 //! frame instead, others in each, so that `--samples` converges to what the levels approximate. They are drawn as random
-//! flakes would reflect, by density P / sigma, so that the table's error cancels in what they add.
+//! flakes would reflect, by density P / sigma, so that the table's error cancels in what they add. Lights and directions
+//! share the loop iterations that draws may take: once they are spent, further leaves count by their expectation.
+//!
+//! Needs shaderInt64.
 
 use super::dpf::{self, Accumulated, DpfSource};
-use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
+use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use crate::{Cache, Progress, RenderError, Update};
@@ -187,7 +190,7 @@ impl Method for Wang2018 {
 
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
         let values = &material.values;
-        let flakes = values.number("count").round() as u64;
+        let flakes = material.flakes();
         let tables = self.tables.get(&material.index).filter(|_| source(material).is_some());
         let params = Params {
             material: material.index as u32,
@@ -201,15 +204,11 @@ impl Method for Wang2018 {
             expectation_above: values.number("expectation") as f32,
             samples: values.number("samples") as u32,
             closed_form: u32::from(tables.is_none()),
-            linear_lookup: u32::from(values.flag("interpolated")),
+            interpolated: u32::from(values.flag("interpolated")),
             weighted: u32::from(values.flag("weighted")),
         };
         let accumulated = tables.map_or(&self.no_table, |tables| &tables.accumulated.table);
         let bind = bind_glints!(Bind, shading, glints, accumulated: accumulated, environment: shading.environment);
         g.pass(bind, params, shading.gbuffer.ids.extent());
-    }
-
-    fn finish(&self, _material: &GlintMaterial) -> Finish {
-        Finish::default()
     }
 }

@@ -33,7 +33,7 @@
 //! The paper has lights only: the environment is the smooth lobe's.
 
 use super::lobe::SmoothEnvironment;
-use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
+use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Graph, Image};
@@ -109,7 +109,7 @@ impl Method for ZirrKaplanyan {
             seed: values.number("seed") as u32,
             alpha: values.number("alpha") as f32,
             sin_half_gamma: material.sin2_half_gamma().sqrt() as f32,
-            density: values.number("count") as f32,
+            density: material.flakes() as f32,
             cone: values.number("cone") as f32,
             variation: values.number("variation") as f32,
             dynamic_range: values.number("dynamic_range") as f32,
@@ -118,9 +118,5 @@ impl Method for ZirrKaplanyan {
         };
         let bind = bind_glints!(Bind, shading, glints, prefiltered: &lobe.prefiltered, albedo: &lobe.albedo);
         g.pass(bind, params, shading.gbuffer.ids.extent());
-    }
-
-    fn finish(&self, _material: &GlintMaterial) -> Finish {
-        Finish::default()
     }
 }

@@ -43,7 +43,7 @@
 mod dictionary;
 
 use super::lobe::SmoothEnvironment;
-use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
+use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Buffer, Graph, Image, Lifetime};
@@ -161,7 +161,7 @@ impl Method for Chermain {
         let params = Params {
             material: material.index as u32,
             alpha: values.number("alpha") as f32,
-            log4_flakes: values.number("count").log(4.0) as f32,
+            log4_flakes: (material.flakes() as f64).log(4.0) as f32,
             seed: values.number("seed") as u32,
             relative_area: values.number("microfacet_relative_area") as f32,
             density_deviation: values.number("density_randomization") as f32,
@@ -177,9 +177,5 @@ impl Method for Chermain {
             dictionary: dictionary,
         );
         g.pass(bind, params, shading.gbuffer.ids.extent());
-    }
-
-    fn finish(&self, _material: &GlintMaterial) -> Finish {
-        Finish::default()
     }
 }

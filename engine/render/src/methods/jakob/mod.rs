@@ -26,14 +26,16 @@
 //! counts as expected, and a footprint of more than 2000 flakes, or one that hardly any steps are left for (many lights, many
 //! `samples`), shows nothing but its expectation. Needs shaderInt64 and shaderFloat64. A cut triangle that is
 //! no leaf is accepted only with more than 1000 flakes: its expectation is dearer than a walk through fewer.
+//!
+//! Needs shaderInt64 and shaderFloat64.
 
 mod triangles;
 
-use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
+use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints, leaf_level};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Buffer, Graph, Image, Lifetime};
-use mica_shaders::constants::FLAKES_A_LEAF;
+use mica_shaders::constants as c;
 use mica_shaders::glints::jakob::{Bind, Params};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -65,6 +67,14 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             meaning: "Area of the footprints to expect, which the tree's shape, and so its flakes, depend on.",
         },
         Setting {
+            key: "steps",
+            unit: "steps",
+            kind: Kind::Integer { min: 200, max: c::JAKOB_STEPS as u64 },
+            default: Value::Number(c::JAKOB_STEPS as f64),
+            meaning: "What a pixel may take for all its walks; a walk that they do not suffice for shows its expectation, \
+                      without glints. Fewer are faster.",
+        },
+        Setting {
             key: "weighted",
             unit: "",
             kind: Kind::Flag,
@@ -88,6 +98,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
         },
     ],
     ladder: &[
+        Rung { name: "2500 steps", set: &[("steps", "2500")] },
         Rung { name: "epsilon .5", set: &[("epsilon", "0.5")] },
         Rung { name: "epsilon .1", set: &[] },
         Rung { name: "epsilon .02", set: &[("epsilon", "0.02")] },
@@ -107,11 +118,6 @@ struct Table {
     triangles: Buffer,
     density_integral: f64,
     alpha: f64,
-}
-
-/// The level of squares that the tree does not divide: where at most [`FLAKES_A_LEAF`] flakes are in one on average.
-fn last_level(flakes: u64) -> u32 {
-    (0..19).find(|level| flakes <= u64::from(FLAKES_A_LEAF) << (2 * level)).unwrap_or(19)
 }
 
 impl Method for Jakob {
@@ -138,7 +144,7 @@ impl Method for Jakob {
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
         let Some(table) = self.tables.get(&material.index) else { return };
         let values = &material.values;
-        let flakes = values.number("count").round() as u64;
+        let flakes = material.flakes();
         let sin2 = material.sin2_half_gamma();
         // q_omega = pi (1 - cos gamma) / 2.
         let mean_solid_angle = PI * sin2;
@@ -151,13 +157,14 @@ impl Method for Jakob {
             flakes_low: flakes as u32,
             flakes_high: (flakes >> 32) as u32,
             seed: values.number("seed") as u32,
-            last_level: last_level(flakes),
+            last_level: leaf_level(flakes),
             split_ratio: (mean_solid_angle / values.number("mean_area")) as f32,
             epsilon: values.number("epsilon") as f32,
             weight: if values.flag("weighted") { table.density_integral as f32 } else { 1.0 },
             density_integral: table.density_integral as f32,
             product: u32::from(values.flag("product")),
             samples: values.number("samples") as u32,
+            steps: values.number("steps") as u32,
         };
         let bind = bind_glints!(
             Bind, shading, glints,
@@ -165,20 +172,5 @@ impl Method for Jakob {
             environment: shading.environment,
         );
         g.pass(bind, params, shading.gbuffer.ids.extent());
-    }
-
-    fn finish(&self, _material: &GlintMaterial) -> Finish {
-        Finish::default()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn squares_are_divided_until_they_hold_four_flakes() {
-        let levels = [0, 1, 4, 5, 16, 17, 1_000_000, 1_000_000_000_000].map(last_level);
-        assert_eq!(levels, [0, 0, 0, 1, 1, 2, 9, 19]);
     }
 }

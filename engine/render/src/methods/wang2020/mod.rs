@@ -131,11 +131,6 @@ fn alpha(material: &GlintMaterial) -> f64 {
     material.values.number("alpha").max(LEAST_ALPHA)
 }
 
-/// Flakes in a square of texture space: a whole number, as a quadtree counts them.
-fn flakes(material: &GlintMaterial) -> f64 {
-    material.values.number("count").round()
-}
-
 impl Method for Wang2020 {
     fn precompute(
         &mut self,
@@ -184,7 +179,7 @@ impl Method for Wang2020 {
             material: material.index as u32,
             alpha: alpha(material) as f32,
             solid_angle: material.solid_angle() as f32,
-            flakes: flakes(material) as f32,
+            flakes: material.flakes() as f32,
             depth,
             cut_depth: (values.number("cut_depth") as u32).min(depth),
             seed: values.number("seed") as u32,

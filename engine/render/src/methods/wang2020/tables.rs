@@ -1,6 +1,6 @@
 //! The tables of one material, and the passes that fill them: accumulated P, prefiltered environment, quadtree.
 
-use super::{ALPHAS, alpha, flakes};
+use super::{ALPHAS, alpha};
 use crate::environment_tables::EnvironmentTables;
 use crate::methods::GlintMaterial;
 use crate::methods::dpf::{Accumulated, AccumulatedKey, DpfSource};
@@ -14,7 +14,7 @@ const PREFILTER_ENTRIES: u64 =
 /// What a prefiltered table depends on, beside the accumulated one: samples. The environment is a renderer's own and does not change.
 type PrefilteredKey = (AccumulatedKey, f64);
 /// What a quadtree depends on: flakes, seed, depth.
-type QuadtreeKey = (f64, f64, f64);
+type QuadtreeKey = (u64, f64, f64);
 
 /// The tables of one material.
 pub(super) struct Tables {
@@ -61,7 +61,7 @@ impl Tables {
         if environment.present() && self.prefiltered_for != Some(prefiltered) {
             self.prefilter(g, material, prefiltered, environment);
         }
-        let quadtree = (flakes(material), material.values.number("seed"), material.values.number("depth"));
+        let quadtree = (material.flakes(), material.values.number("seed"), material.values.number("depth"));
         if self.quadtree_for != Some(quadtree) {
             self.split(g, material, quadtree);
         }
@@ -100,10 +100,10 @@ impl Tables {
     fn split(&mut self, g: &mut Graph, material: &GlintMaterial, key: QuadtreeKey) {
         let (flakes, seed, depth) = (key.0, key.1, key.2 as u32);
         let change = match self.quadtree_for {
-            Some((before, _, _)) if before != flakes => format!("count is now {}", Value::Number(flakes)),
+            Some((before, _, _)) if before != flakes => format!("count is now {}", Value::Number(flakes as f64)),
             Some((_, before, _)) if before != seed => format!("seed is now {seed}"),
             Some(_) => format!("depth is now {depth}"),
-            None => format!("first frame with {} flakes", Value::Number(flakes)),
+            None => format!("first frame with {} flakes", Value::Number(flakes as f64)),
         };
         g.because(format!("material {}: {change}", material.name));
         let bytes = node_count(depth) * 16;
