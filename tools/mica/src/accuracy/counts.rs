@@ -121,7 +121,8 @@ fn measure(
     let (side, seeds) = match (condition.flakes, quick) {
         (..=10.0, false) => (128, 8),
         (..=1e3, false) => (128, 1),
-        (_, false) => (64, 1),
+        (..=1e4, false) => (64, 1),
+        (_, false) => (32, 1),
         (..=1e3, true) => (64, 1),
         (_, true) => (32, 1),
     };
