@@ -2,8 +2,8 @@
 
 Run on demand from the root of the tree; no other test needs it:
 
-    python3 -m venv /tmp/mitsuba && /tmp/mitsuba/bin/pip install mitsuba numpy
-    /tmp/mitsuba/bin/python tests/cross_check/smooth_brdf_mitsuba.py
+    python3 -m venv mitsuba-venv && mitsuba-venv/bin/pip install mitsuba numpy
+    mitsuba-venv/bin/python tests/cross_check/smooth_brdf_mitsuba.py
 
 Evaluates `roughconductor` (no Fresnel reflectance, both distributions, alpha .1, .3, .5) for the directions that
 `cargo run -p mica-oracle --example smooth_brdf` prints, and compares. Mitsuba computes in 32 bits, has Beckmann's masking

@@ -1,14 +1,13 @@
 //! Queries of the tree of Jakob et al. 2014, put to the shader itself: how many flakes of a footprint are lit.
 
 use glam::{DVec2, DVec3};
-use mica_graph::{Access, Binding, BindingKind, Buffer, Graph, Shader, Slot, Stage, StageCode, Stages, Use, Work};
+use mica_graph::{Access, Graph, Shader};
 use mica_render::JakobTable;
 use mica_tests::Gpu;
-use std::path::Path;
-use std::process::Command;
-use std::sync::atomic::{AtomicU32, Ordering};
+use mica_tests::shaders::{Change, filled, push_pass, test_shader};
 
-const GROUP: u32 = 64;
+/// The shader's buffers: triangles, queries, answers.
+const BUFFERS: [(u32, Access); 3] = [(50, Access::StorageRead), (30, Access::StorageRead), (31, Access::StorageWrite)];
 /// Flakes are counted by place and normal, by place alone, by normal alone.
 pub const MODES: [u32; 3] = [0, 1, 2];
 
@@ -114,83 +113,25 @@ pub struct Counter {
 impl Counter {
     /// With the shaders as they are.
     pub fn new() -> Self {
-        Self::with_change("jakob_tree", "", "")
+        Self { shader: test_shader("jakob_counts.comp", None, &BUFFERS, 0) }
     }
 
     /// With one passage of `shared/FILE.glsl` replaced by another: what a test must notice.
     pub fn with_change(file: &str, from: &str, to: &str) -> Self {
-        Self { shader: shader(file, from, to) }
+        let change = Change { file: &format!("shared/{file}.glsl"), from, to };
+        Self { shader: test_shader("jakob_counts.comp", Some(change), &BUFFERS, 0) }
     }
 
     /// What the device says of each query.
     pub fn count(&self, gpu: &mut Gpu, table: &JakobTable, queries: &[Query]) -> Vec<Answer> {
         let mut graph = Graph::new();
-        let mut filled = |name: &str, bytes: &[u8]| {
-            let mut buffer = graph.buffer(name, bytes.len() as u64);
-            graph.upload(&mut buffer, bytes);
-            buffer
-        };
-        let triangles = filled("triangles", bytemuck::cast_slice(&table.triangles));
-        let asked = filled("queries", bytemuck::cast_slice(queries));
+        let triangles = filled(&mut graph, "triangles", bytemuck::cast_slice(&table.triangles));
+        let asked = filled(&mut graph, "queries", bytemuck::cast_slice(queries));
         let answers = graph.buffer("answers", (queries.len() * size_of::<Answer>()) as u64);
-        let bind = |slot, buffer: &Buffer, access| Use {
-            resource: buffer.resource().clone(),
-            slot: Slot::Binding(slot),
-            access,
-            stages: Stages::COMPUTE,
-        };
-        let uses = vec![
-            bind(50, &triangles, Access::StorageRead),
-            bind(30, &asked, Access::StorageRead),
-            bind(31, &answers, Access::StorageWrite),
-        ];
-        let groups = [(queries.len() as u32).div_ceil(GROUP), 1, 1];
-        graph.push("jakob_counts", Work::Compute { shader: self.shader, params: Vec::new(), groups }, uses);
+        let buffers = [&triangles, &asked, &answers];
+        let bound: Vec<_> =
+            BUFFERS.iter().zip(buffers).map(|(&(slot, access), buffer)| (slot, buffer, access)).collect();
+        push_pass(&mut graph, self.shader, &[], queries.len(), &bound);
         bytemuck::pod_collect_to_vec(&gpu.run(graph, &[&answers])[0])
     }
-}
-
-/// Compiles `jakob_counts.comp` around the shaders, changed or not. Shaders are statics in the program; a test's live as
-/// long as its process.
-fn shader(file: &str, from: &str, to: &str) -> &'static Shader {
-    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let shaders = package.join("../shaders_glsl");
-    // A folder for each, as tests run at once.
-    static MADE: AtomicU32 = AtomicU32::new(0);
-    let name = format!("jakob_counts_{}_{}", std::process::id(), MADE.fetch_add(1, Ordering::Relaxed));
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    std::fs::create_dir_all(folder.join("shared")).expect("a folder");
-    let name = format!("shared/{file}.glsl");
-    let source = std::fs::read_to_string(shaders.join(&name)).expect("the shader's source");
-    assert!(source.contains(from), "{name} no longer says {from:?}: change this test with it");
-    std::fs::write(folder.join(&name), source.replacen(from, to, 1)).expect("its copy");
-    let output = folder.join("jakob_counts.spv");
-    let tool = std::env::var_os("GLSLANG_VALIDATOR").unwrap_or_else(|| "glslangValidator".into());
-    let include = |path: &Path| format!("-I{}", path.display());
-    let done = Command::new(tool)
-        .args(["--target-env", "vulkan1.3", &include(&folder), &include(&shaders), "-o"])
-        .args([output.as_path(), &package.join("tests/jakob_counts.comp")])
-        .output()
-        .expect("glslangValidator runs (Debian: glslang-tools)");
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stdout));
-    let spirv: Vec<u32> = bytemuck::pod_collect_to_vec(&std::fs::read(output).expect("its output"));
-    let _ = std::fs::remove_dir_all(&folder);
-
-    let accesses = [(50, "triangles"), (30, "queries"), (31, "answers")];
-    let bindings = accesses.map(|(slot, name)| Binding {
-        name,
-        slot,
-        kind: BindingKind::StorageBuffer,
-        access: if name == "answers" { Access::StorageWrite } else { Access::StorageRead },
-        stages: Stages::COMPUTE,
-    });
-    Box::leak(Box::new(Shader {
-        name: "jakob_counts",
-        variant: "",
-        stages: vec![StageCode { stage: Stage::Compute, spirv: spirv.leak() }].leak(),
-        group: [GROUP, 1, 1],
-        bindings: bindings.to_vec().leak(),
-        params_bytes: 0,
-        outputs: &[],
-    }))
 }
