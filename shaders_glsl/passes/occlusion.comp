@@ -4,6 +4,7 @@
 #include "shared/frame.glsl"
 #include "shared/gbuffer.glsl"
 #include "shared/materials.glsl"
+#include "shared/ray_counts.glsl"
 #include "shared/ray_offset.glsl"
 #include "occlusion.glsl"
 
@@ -12,15 +13,17 @@ layout(binding = 40, r32f) uniform writeonly image2D visibility; // 1 free, 0 oc
 
 void main() {
   uvec2 pixel = gl_GlobalInvocationID.xy;
-  if (outside_frame(pixel)) {
-    return;
+  if (!outside_frame(pixel)) {
+    Seen seen = seen_at(pixel);
+    bool asks = seen.instance != 0u;
+    asks = asks && (materials[instances[seen.instance - 1u].material].flags & MATERIAL_GLINTS) != 0u;
+    float free = 1.0;
+    if (asks) {
+      vec3 mirrored = reflect(normalize(camera_ray(pixel)), seen.normal);
+      vec3 origin = offset_origin(seen.position, seen.geometric_normal, frame.scene_unit);
+      free = occluded(origin, mirrored, 0.0, 1e30) ? 0.0 : 1.0;
+    }
+    imageStore(visibility, ivec2(pixel), vec4(free));
   }
-  Seen seen = seen_at(pixel);
-  float free = 1.0;
-  if (seen.instance != 0u && (materials[instances[seen.instance - 1u].material].flags & MATERIAL_GLINTS) != 0u) {
-    vec3 mirrored = reflect(normalize(camera_ray(pixel)), seen.normal);
-    vec3 origin = offset_origin(seen.position, seen.geometric_normal);
-    free = occluded(origin, mirrored, 0.0, 1e30) ? 0.0 : 1.0;
-  }
-  imageStore(visibility, ivec2(pixel), vec4(free));
+  count_rays();
 }

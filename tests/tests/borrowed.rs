@@ -81,6 +81,7 @@ impl Host {
                 Feature::StorageImageExtendedFormats => core.shader_storage_image_extended_formats = vk::TRUE,
                 Feature::Int64 => core.shader_int64 = vk::TRUE,
                 Feature::Float64 => core.shader_float64 = vk::TRUE,
+                optional => unreachable!("{optional:?} is never needed"),
             }
         }
         assert!(MicaDevice::requirements().device_extensions.is_empty(), "this host enables none");

@@ -2,8 +2,9 @@
 
 use crate::device::Device;
 use crate::error::Error;
-use crate::features::{Feature, REQUIREMENTS, Version, lacking};
+use crate::features::{Feature, OF_RAY_QUERY, REQUIREMENTS, Version, enables_ray_query, lacking};
 use crate::info;
+use crate::structures::Support;
 use ash::{ext, vk};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -20,7 +21,8 @@ pub struct HostDevice<'a> {
     pub api_version: Version,
     /// The family of the queue that the recorded command buffers are submitted to; graphics and compute.
     pub queue_family: u32,
-    /// Those of the features in [`Device::requirements`], needed and optional, that the host enabled.
+    /// Those of the features in [`Device::requirements`], needed and optional, that the host enabled, each with its
+    /// [`Feature::extensions`].
     pub enabled: &'a [Feature],
     /// Whether the host enabled `VK_EXT_debug_utils`, for names and labels.
     pub debug_utils: bool,
@@ -58,6 +60,11 @@ impl Device {
             return Err(unusable(format!("queue family {} lacks graphics or compute", host.queue_family)));
         }
         info.limits.timestamp_valid_bits = family.timestamp_valid_bits;
+        if !enables_ray_query(host.enabled) {
+            // What the device offers is no use where the host has not enabled it.
+            let missing = OF_RAY_QUERY.iter().filter(|feature| !host.enabled.contains(feature));
+            info.ray_query_lacks = missing.map(|feature| feature.name().to_owned()).collect();
+        }
         Ok(Arc::new(Self {
             raw: host.device.clone(),
             instance: host.instance.clone(),
@@ -65,6 +72,8 @@ impl Device {
             queue_family: host.queue_family,
             info,
             features: host.enabled.to_vec(),
+            structures: enables_ray_query(host.enabled)
+                .then(|| Support::new(host.instance, host.device, host.physical_device)),
             debug_utils: host.debug_utils.then(|| ext::debug_utils::Device::new(host.instance, host.device)),
             own: None,
             lost: AtomicBool::new(false),

@@ -51,6 +51,8 @@ fn write_binding(
     let general = vk::DescriptorImageInfo::default().image_layout(vk::ImageLayout::GENERAL);
     let mut image_info = [general];
     let mut buffer_info = [vk::DescriptorBufferInfo::default()];
+    let mut structures = [vk::AccelerationStructureKHR::null()];
+    let mut structure_info = vk::WriteDescriptorSetAccelerationStructureKHR::default();
     let write = match (preparation.object(used)?, binding.kind) {
         (Object::Image(image), BindingKind::SampledImage) => {
             image_info[0] = general.image_view(image.all);
@@ -64,6 +66,11 @@ fn write_binding(
             check_range(preparation, binding.kind, used, buffer)?;
             buffer_info[0] = vk::DescriptorBufferInfo { buffer: buffer.buffer, offset: 0, range: buffer.bytes };
             write.buffer_info(&buffer_info)
+        }
+        (Object::Structure(structure), BindingKind::AccelerationStructure) => {
+            structures[0] = structure.raw;
+            structure_info = structure_info.acceleration_structures(&structures);
+            write.descriptor_count(1).push_next(&mut structure_info)
         }
         _ => return Err(preparation.bad_use(used, &format!("binding {} is a {:?}", binding.name, binding.kind))),
     };
@@ -98,6 +105,7 @@ fn suits(kind: BindingKind, access: Access) -> bool {
         BindingKind::StorageImage | BindingKind::StorageBuffer => {
             matches!(access, Access::StorageRead | Access::StorageWrite | Access::StorageReadWrite)
         }
+        BindingKind::AccelerationStructure => access == Access::Traverse,
         BindingKind::Sampler(_) => false,
     }
 }

@@ -1,20 +1,21 @@
 //! The device that everything runs on: created here, or borrowed from a host.
 
 use crate::error::Error;
-use crate::features::{DeviceRequirements, Feature, REQUIREMENTS, offered, to_enable};
+use crate::features::{Chain, DeviceRequirements, Feature, REQUIREMENTS, enables_ray_query, offered};
 use crate::info::{self, DeviceInfo};
 use crate::instance::Instance;
 use crate::messages::{Message, Messages};
+use crate::structures::Support;
 use ash::{ext, vk};
-use std::ffi::CString;
+use std::ffi::{CString, c_char};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 /// Which device to create, and how.
 #[derive(Clone, Debug, Default)]
 pub struct DeviceOptions {
-    /// A device by its index in [`crate::devices`] or by a part of its name, without regard to case. `None` takes the
-    /// best: discrete before integrated before virtual before CPU.
+    /// A device by its index in [`crate::devices`], or by a part of its name or of its driver's name and version, without
+    /// regard to case. `None` takes the best: discrete before integrated before virtual before CPU.
     pub select: Option<String>,
     /// Turns the validation layer on, with synchronisation validation. Its messages are collected for
     /// [`Device::take_messages`]. Hazards between two submissions are seen only if the process was started with
@@ -31,6 +32,8 @@ pub struct Device {
     pub(crate) info: DeviceInfo,
     /// Those that are enabled.
     pub(crate) features: Vec<Feature>,
+    /// There where ray queries are.
+    pub(crate) structures: Option<Support>,
     pub(crate) debug_utils: Option<ext::debug_utils::Device>,
     /// What we made and must destroy; `None` for a borrowed device.
     pub(crate) own: Option<Own>,
@@ -62,16 +65,20 @@ impl Device {
         let queues =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&priorities)];
         let features = offered(&instance.raw, physical);
-        let (core, mut vulkan13) = to_enable(&features);
+        let extensions: Vec<*const c_char> =
+            features.iter().flat_map(|feature| feature.extensions()).map(|name| name.as_ptr()).collect();
+        let mut chain = Chain::enabling(&features);
+        let mut enabled = chain.features(|feature| features.contains(&feature));
         let create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
-            .enabled_features(&core)
-            .push_next(&mut vulkan13);
+            .enabled_extension_names(&extensions)
+            .push_next(&mut enabled);
         // SAFETY: the device offers every feature in the chain, as `choose` checked, and has the queue family.
         let raw = unsafe { instance.raw.create_device(physical, &create, None) }
             .map_err(|result| unusable(&format!("vkCreateDevice: {result}")))?;
         // SAFETY: the queue was created with the device.
         let queue = unsafe { raw.get_device_queue(queue_family, 0) };
+        let structures = enables_ray_query(&features).then(|| Support::new(&instance.raw, &raw, physical));
         let debug_utils = instance.debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw));
         Ok(Arc::new(Self {
             raw,
@@ -80,6 +87,7 @@ impl Device {
             queue_family,
             info,
             features,
+            structures,
             debug_utils,
             own: Some(Own { instance, queue: Mutex::new(queue) }),
             lost: AtomicBool::new(false),
@@ -170,7 +178,12 @@ type Found = (vk::PhysicalDevice, DeviceInfo);
 
 fn choose(found: Vec<Found>, select: Option<&str>) -> Result<Found, Error> {
     let names = |found: &[Found]| {
-        found.iter().map(|(_, info)| format!("{} {}", info.index, info.name)).collect::<Vec<_>>().join(", ")
+        let driver = |info: &DeviceInfo| format!("{} {}", info.driver, info.driver_version);
+        found
+            .iter()
+            .map(|(_, info)| format!("{} {} ({})", info.index, info.name, driver(info)))
+            .collect::<Vec<_>>()
+            .join(", ")
     };
     let all = names(&found);
     let Some(select) = select else {
@@ -185,7 +198,8 @@ fn choose(found: Vec<Found>, select: Option<&str>) -> Result<Found, Error> {
     };
     let wanted = select.to_lowercase();
     let index = select.parse::<usize>().ok();
-    let fits = |info: &DeviceInfo| index == Some(info.index) || info.name.to_lowercase().contains(&wanted);
+    let words = |info: &DeviceInfo| format!("{} {} {}", info.name, info.driver, info.driver_version).to_lowercase();
+    let fits = |info: &DeviceInfo| index == Some(info.index) || words(info).contains(&wanted);
     // An index is meant as one, even where a name has the same digits in it.
     let mut matching: Vec<Found> = found.into_iter().filter(|(_, info)| fits(info)).collect();
     matching.sort_by_key(|(_, info)| (index != Some(info.index), info.unusable.is_some(), info.kind));

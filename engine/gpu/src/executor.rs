@@ -12,7 +12,7 @@ use crate::slot::{Slot, Staging};
 use crate::submit::Submission;
 use crate::timing::{PassTime, Timing, elapsed_ns};
 use ash::vk;
-use mica_graph::{Buffer, Download, Graph, Image, Lifetime, Plan, Requirements};
+use mica_graph::{Buffer, Description, Download, Graph, Image, Lifetime, Plan, Requirements, ResourceId, Work};
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -170,6 +170,7 @@ impl Executor {
         slot.frame = None;
         let memory = slot.staging.as_ref().and_then(|staging| staging.allocation.mapped_slice()).unwrap_or_default();
         let downloads = downloads.into_iter().map(|(download, place)| (download, memory[place].to_vec())).collect();
+        self.note_compacted(index, &plan)?;
         let (pass_ns, frame_ns) = self.times(index, timing, plan.passes.len())?;
         let passes =
             plan.passes.iter().zip(pass_ns).map(|(pass, ns)| PassTime { name: pass.name.clone(), ns }).collect();
@@ -244,6 +245,7 @@ impl Executor {
         if measures {
             slot.ready_timestamps(device, count)?;
         }
+        slot.ready_sizes(device, prepared.size_queries)?;
         let downloads = fill_staging(slot, &prepared.commands);
         let undefined = self.resources.take_undefined(&plan, frame);
         let hosts = self.resources.hosts_of(&plan);
@@ -255,6 +257,7 @@ impl Executor {
             objects: &objects,
             staging: slot.staging.as_ref().map_or(vk::Buffer::null(), |staging| staging.buffer.buffer),
             timestamps: slot.timestamps.as_ref().filter(|_| measures).map(|timestamps| (timestamps.pool, count)),
+            sizes: slot.sizes.as_ref().map(|sizes| (sizes.pool, prepared.size_queries)),
             timing,
             undefined: &undefined,
             hosts: &hosts,
@@ -302,6 +305,21 @@ impl Executor {
         })
     }
 
+    /// Keeps what the structures that a finished frame built need once they are compacted.
+    fn note_compacted(&mut self, slot: usize, plan: &Plan) -> Result<(), Error> {
+        let builds = plan.passes.iter().filter(|pass| matches!(pass.work, Work::BuildMeshes { .. }));
+        let structures: Vec<ResourceId> = builds
+            .flat_map(|pass| &pass.uses)
+            .filter(|used| matches!(used.resource.description, Description::Structure(_)))
+            .map(|used| used.resource.id)
+            .collect();
+        if let Some(sizes) = self.slots[slot].sizes.as_ref() {
+            let sizes = sizes.read(&self.device, structures.len() as u32)?;
+            structures.into_iter().zip(sizes).for_each(|(id, bytes)| self.resources.note_compacted(id, bytes));
+        }
+        Ok(())
+    }
+
     /// Adds to an error the pass that did not finish, which isolated timing knows.
     fn name_pass(&self, error: Error, recorded: &Recorded) -> Error {
         let begun = self.slots[recorded.slot].staging.as_ref().map_or(0, Staging::marker) as usize;
@@ -337,7 +355,10 @@ fn fill_staging(slot: &mut Slot, commands: &[Command<'_>]) -> HashMap<Download, 
     memory[..MARKER_BYTES].fill(0);
     for command in commands {
         match command {
-            Command::Upload { bytes, data, .. } => memory[bytes.clone()].copy_from_slice(data),
+            Command::Upload { bytes, data, .. } | Command::Update { bytes, data, .. } => {
+                memory[bytes.clone()].copy_from_slice(data)
+            }
+            Command::BuildInstances { bytes, records, .. } => memory[bytes.clone()].copy_from_slice(records),
             Command::Download { bytes, download, .. } => drop(places.insert(*download, bytes.clone())),
             _ => {}
         }

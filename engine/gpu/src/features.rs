@@ -1,6 +1,7 @@
 //! What Mica needs of a device, as data that a host can read before it creates its own.
 
 use ash::{khr, vk};
+use std::ffi::{CStr, CString};
 
 /// A feature of Vulkan that Mica uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -17,6 +18,12 @@ pub enum Feature {
     Int64,
     /// `VkPhysicalDeviceFeatures::shaderFloat64`.
     Float64,
+    /// `VkPhysicalDeviceVulkan12Features::bufferDeviceAddress`.
+    BufferDeviceAddress,
+    /// `VkPhysicalDeviceAccelerationStructureFeaturesKHR::accelerationStructure`, of an extension.
+    AccelerationStructure,
+    /// `VkPhysicalDeviceRayQueryFeaturesKHR::rayQuery`, of an extension.
+    RayQuery,
 }
 
 impl Feature {
@@ -29,6 +36,18 @@ impl Feature {
             Self::StorageImageExtendedFormats => "shaderStorageImageExtendedFormats",
             Self::Int64 => "shaderInt64",
             Self::Float64 => "shaderFloat64",
+            Self::BufferDeviceAddress => "bufferDeviceAddress",
+            Self::AccelerationStructure => "accelerationStructure",
+            Self::RayQuery => "rayQuery",
+        }
+    }
+
+    /// The device extensions that it comes with.
+    pub const fn extensions(self) -> &'static [&'static CStr] {
+        match self {
+            Self::AccelerationStructure => &[khr::acceleration_structure::NAME, khr::deferred_host_operations::NAME],
+            Self::RayQuery => &[khr::ray_query::NAME],
+            _ => &[],
         }
     }
 }
@@ -49,7 +68,8 @@ pub struct DeviceRequirements {
     pub api_version: Version,
     /// Features to enable.
     pub features: &'static [FeatureRequirement],
-    /// Features to enable where there are any: passes that use one of them are refused without it, and no others.
+    /// Features to enable where there are any, with their [`Feature::extensions`]: passes that use one of them are
+    /// refused without it, and no others. Those of ray queries are of use together only.
     pub optional_features: &'static [FeatureRequirement],
     /// Device extensions to enable.
     pub device_extensions: &'static [&'static str],
@@ -110,32 +130,86 @@ pub(crate) const REQUIREMENTS: DeviceRequirements = DeviceRequirements {
             why: "whole counts of flakes in flakes, jakob, atanasov and wang2018",
         },
         FeatureRequirement { feature: Feature::Float64, why: "exact tests of flakes in flakes and jakob" },
+        FeatureRequirement { feature: Feature::BufferDeviceAddress, why: "builds of acceleration structures" },
+        FeatureRequirement { feature: Feature::AccelerationStructure, why: "occlusion by ray queries" },
+        FeatureRequirement { feature: Feature::RayQuery, why: "occlusion by ray queries" },
     ],
     device_extensions: &[],
     optional_instance_extensions: &["VK_EXT_debug_utils"],
     queue_flags: vk::QueueFlags::from_raw(vk::QueueFlags::GRAPHICS.as_raw() | vk::QueueFlags::COMPUTE.as_raw()),
 };
 
-/// The features among those needed or of use that a physical device offers.
+/// What occlusion by ray queries takes.
+pub(crate) const OF_RAY_QUERY: [Feature; 3] =
+    [Feature::BufferDeviceAddress, Feature::AccelerationStructure, Feature::RayQuery];
+
+/// The features among those needed or of use that a physical device offers. Those of ray queries are there all or none.
 pub(crate) fn offered(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> Vec<Feature> {
-    let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
-    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan13);
-    // SAFETY: the physical device is of this instance, has Vulkan 1.3 (the caller checked), and the chain is valid.
-    unsafe { instance.get_physical_device_features2(physical_device, &mut features) };
-    let core = features.features;
+    let mut found = features_of(instance, physical_device);
+    if !enables_ray_query(&found) {
+        found.retain(|feature| !OF_RAY_QUERY.contains(feature));
+    }
+    found
+}
+
+/// Whether ray queries can be made with these features.
+pub(crate) fn enables_ray_query(features: &[Feature]) -> bool {
+    OF_RAY_QUERY.iter().all(|feature| features.contains(feature))
+}
+
+/// The names of the extensions and features that a physical device lacks for ray queries.
+pub(crate) fn ray_query_lacks(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> Vec<String> {
+    let found = features_of(instance, physical_device);
+    let extensions = extensions_of(instance, physical_device);
+    let lacking = OF_RAY_QUERY.iter().filter(|feature| !found.contains(feature));
+    // A feature whose extension is missing needs no mention of its own.
+    let names = lacking.flat_map(|feature| {
+        let missing: Vec<String> = feature
+            .extensions()
+            .iter()
+            .filter(|extension| !extensions.iter().any(|name| name.as_c_str() == **extension))
+            .map(|extension| extension.to_string_lossy().into_owned())
+            .collect();
+        if missing.is_empty() { vec![feature.name().to_owned()] } else { missing }
+    });
+    names.collect()
+}
+
+fn features_of(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> Vec<Feature> {
+    let extensions = extensions_of(instance, physical_device);
+    let comes_with = |feature: Feature| {
+        feature.extensions().iter().all(|extension| extensions.iter().any(|name| name.as_c_str() == *extension))
+    };
+    let mut chain = Chain::default();
+    let core = {
+        let mut features = chain.features(comes_with);
+        // SAFETY: the physical device is of this instance, has Vulkan 1.3 (the caller checked) and the extensions whose
+        // structures are in the chain.
+        unsafe { instance.get_physical_device_features2(physical_device, &mut features) };
+        features.features
+    };
     let has = |feature: Feature| {
         vk::TRUE
             == match feature {
-                Feature::Synchronization2 => vulkan13.synchronization2,
-                Feature::DynamicRendering => vulkan13.dynamic_rendering,
-                Feature::Maintenance4 => vulkan13.maintenance4,
+                Feature::Synchronization2 => chain.vulkan13.synchronization2,
+                Feature::DynamicRendering => chain.vulkan13.dynamic_rendering,
+                Feature::Maintenance4 => chain.vulkan13.maintenance4,
                 Feature::StorageImageExtendedFormats => core.shader_storage_image_extended_formats,
                 Feature::Int64 => core.shader_int64,
                 Feature::Float64 => core.shader_float64,
+                Feature::BufferDeviceAddress => chain.addresses.buffer_device_address,
+                Feature::AccelerationStructure => chain.structures.acceleration_structure,
+                Feature::RayQuery => chain.queries.ray_query,
             }
     };
     let of_use = REQUIREMENTS.features.iter().chain(REQUIREMENTS.optional_features).map(|wanted| wanted.feature);
-    of_use.filter(|feature| has(*feature)).collect()
+    of_use.filter(|feature| comes_with(*feature) && has(*feature)).collect()
+}
+
+fn extensions_of(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> Vec<CString> {
+    // SAFETY: the physical device is of this instance.
+    let found = unsafe { instance.enumerate_device_extension_properties(physical_device) }.unwrap_or_default();
+    found.iter().filter_map(|extension| Some(extension.extension_name_as_c_str().ok()?.to_owned())).collect()
 }
 
 /// The names of the needed features that are not in `features`.
@@ -144,31 +218,48 @@ pub(crate) fn lacking(features: &[Feature]) -> Vec<&'static str> {
     needed.filter(|feature| !features.contains(feature)).map(Feature::name).collect()
 }
 
-/// Features as `vkCreateDevice` takes them.
-pub(crate) fn to_enable(
-    features: &[Feature],
-) -> (vk::PhysicalDeviceFeatures, vk::PhysicalDeviceVulkan13Features<'static>) {
-    let mut core = vk::PhysicalDeviceFeatures::default();
-    let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
-    for feature in features {
-        match feature {
-            Feature::Synchronization2 => vulkan13.synchronization2 = vk::TRUE,
-            Feature::DynamicRendering => vulkan13.dynamic_rendering = vk::TRUE,
-            Feature::Maintenance4 => vulkan13.maintenance4 = vk::TRUE,
-            Feature::StorageImageExtendedFormats => core.shader_storage_image_extended_formats = vk::TRUE,
-            Feature::Int64 => core.shader_int64 = vk::TRUE,
-            Feature::Float64 => core.shader_float64 = vk::TRUE,
-        }
-    }
-    (core, vulkan13)
+/// Vulkan's structures for all features, to ask for them and to enable them.
+#[derive(Default)]
+pub(crate) struct Chain {
+    core: vk::PhysicalDeviceFeatures,
+    vulkan13: vk::PhysicalDeviceVulkan13Features<'static>,
+    addresses: vk::PhysicalDeviceBufferDeviceAddressFeatures<'static>,
+    structures: vk::PhysicalDeviceAccelerationStructureFeaturesKHR<'static>,
+    queries: vk::PhysicalDeviceRayQueryFeaturesKHR<'static>,
 }
 
-/// Whether the device could trace rays in a compute shader.
-pub(crate) fn offers_ray_query(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> bool {
-    // SAFETY: the physical device is of this instance.
-    let Ok(extensions) = (unsafe { instance.enumerate_device_extension_properties(physical_device) }) else {
-        return false;
-    };
-    let has = |name| extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
-    has(khr::ray_query::NAME) && has(khr::acceleration_structure::NAME)
+impl Chain {
+    /// With these features switched on.
+    pub(crate) fn enabling(features: &[Feature]) -> Self {
+        let mut chain = Self::default();
+        for feature in features {
+            *match feature {
+                Feature::Synchronization2 => &mut chain.vulkan13.synchronization2,
+                Feature::DynamicRendering => &mut chain.vulkan13.dynamic_rendering,
+                Feature::Maintenance4 => &mut chain.vulkan13.maintenance4,
+                Feature::StorageImageExtendedFormats => &mut chain.core.shader_storage_image_extended_formats,
+                Feature::Int64 => &mut chain.core.shader_int64,
+                Feature::Float64 => &mut chain.core.shader_float64,
+                Feature::BufferDeviceAddress => &mut chain.addresses.buffer_device_address,
+                Feature::AccelerationStructure => &mut chain.structures.acceleration_structure,
+                Feature::RayQuery => &mut chain.queries.ray_query,
+            } = vk::TRUE;
+        }
+        chain
+    }
+
+    /// The structures linked, those of extensions only where `includes` says so.
+    pub(crate) fn features(&mut self, includes: impl Fn(Feature) -> bool) -> vk::PhysicalDeviceFeatures2<'_> {
+        let mut features = vk::PhysicalDeviceFeatures2::default()
+            .features(self.core)
+            .push_next(&mut self.vulkan13)
+            .push_next(&mut self.addresses);
+        if includes(Feature::AccelerationStructure) {
+            features = features.push_next(&mut self.structures);
+        }
+        if includes(Feature::RayQuery) {
+            features = features.push_next(&mut self.queries);
+        }
+        features
+    }
 }

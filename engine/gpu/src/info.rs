@@ -88,12 +88,19 @@ pub struct DeviceInfo {
     pub api_version: Version,
     /// Its limits.
     pub limits: Limits,
-    /// Whether the device offers ray queries.
-    pub ray_query: bool,
+    /// The extensions and features that the device lacks for ray queries; empty if it offers them.
+    pub ray_query_lacks: Vec<String>,
     /// Why it cannot serve; `None` if it can.
     pub unusable: Option<String>,
     /// What a pipeline cache must agree with: the device's and the driver's identity.
     pub(crate) cache_identity: CacheIdentity,
+}
+
+impl DeviceInfo {
+    /// Whether the device offers ray queries.
+    pub fn offers_ray_query(&self) -> bool {
+        self.ray_query_lacks.is_empty()
+    }
 }
 
 /// What a pipeline cache depends on. Mesa 22.3's lavapipe has a cache UUID that does not change with the driver, hence
@@ -175,7 +182,11 @@ pub(crate) fn describe(instance: &ash::Instance, device: vk::PhysicalDevice, ind
             timestamp_period_ns: core.limits.timestamp_period,
             device_memory_bytes: memory.memory_heaps_as_slice().iter().filter(local).map(|heap| heap.size).sum(),
         },
-        ray_query: modern && features::offers_ray_query(instance, device),
+        ray_query_lacks: if modern {
+            features::ray_query_lacks(instance, device)
+        } else {
+            vec![format!("Vulkan {}", REQUIREMENTS.api_version)]
+        },
         unusable: unusable(instance, device, api_version, family.is_some()),
         cache_identity: CacheIdentity {
             cache_uuid: core.pipeline_cache_uuid,

@@ -41,6 +41,7 @@ mod record;
 mod resources;
 mod run;
 mod slot;
+mod structures;
 mod submit;
 mod timing;
 mod vulkan_types;

@@ -2,11 +2,12 @@
 
 use crate::device::Device;
 use crate::error::{Call, Error};
+use crate::structures::{self, StructureObject};
 use crate::vulkan_types as to_vk;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
 use gpu_allocator::{AllocationSizes, AllocatorDebugSettings, MemoryLocation};
-use mica_graph::{BufferDesc, Description, ImageDesc};
+use mica_graph::{BufferDesc, Description, ImageDesc, StructureDesc};
 use std::mem::ManuallyDrop;
 use std::sync::Arc;
 
@@ -17,6 +18,7 @@ const MIB: u64 = 1 << 20;
 pub(crate) enum Object {
     Image(ImageObject),
     Buffer(BufferObject),
+    Structure(StructureObject),
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +57,7 @@ impl Memory {
             device: device.raw.clone(),
             physical_device: device.physical,
             debug_settings: AllocatorDebugSettings::default(),
-            buffer_device_address: false,
+            buffer_device_address: device.structures.is_some(),
             allocation_sizes: AllocationSizes::new(block, block.min(16 * MIB)),
         })
         .map_err(|error| out_of_memory("the allocator", 0, &error))?;
@@ -102,8 +104,18 @@ impl Memory {
         desc: BufferDesc,
         location: MemoryLocation,
     ) -> Result<(BufferObject, Allocation), Error> {
+        self.buffer_for(what, desc, buffer_usage(&self.device), location)
+    }
+
+    fn buffer_for(
+        &mut self,
+        what: &str,
+        desc: BufferDesc,
+        usage: vk::BufferUsageFlags,
+        location: MemoryLocation,
+    ) -> Result<(BufferObject, Allocation), Error> {
         let device = self.device.clone();
-        let object = create_buffer(&device, what, desc)?;
+        let object = create_buffer_for(&device, what, desc, usage)?;
         // SAFETY: the buffer is alive.
         let requirements = unsafe { device.raw.get_buffer_memory_requirements(object.buffer) };
         let allocation = self.allocate(what, requirements, location, true);
@@ -116,6 +128,28 @@ impl Memory {
             Err(error) => {
                 // SAFETY: nothing has used the buffer.
                 unsafe { device.raw.destroy_buffer(object.buffer, None) };
+                Err(error)
+            }
+        }
+    }
+
+    /// An acceleration structure of so many bytes with memory of its own.
+    pub(crate) fn structure(
+        &mut self,
+        what: &str,
+        desc: &StructureDesc,
+        bytes: u64,
+    ) -> Result<(StructureObject, Allocation), Error> {
+        let device = self.device.clone();
+        let usage =
+            vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
+        let (buffer, allocation) = self.buffer_for(what, BufferDesc { bytes }, usage, MemoryLocation::GpuOnly)?;
+        match structures::create(&device, what, desc, buffer) {
+            Ok(object) => Ok((object, allocation)),
+            Err(error) => {
+                // SAFETY: nothing has used the buffer.
+                unsafe { device.raw.destroy_buffer(buffer.buffer, None) };
+                self.free(allocation);
                 Err(error)
             }
         }
@@ -177,8 +211,15 @@ fn out_of_memory(what: &str, bytes: u64, error: &gpu_allocator::AllocationError)
 }
 
 /// How a buffer is created.
-pub(crate) fn buffer_info(desc: BufferDesc) -> vk::BufferCreateInfo<'static> {
-    vk::BufferCreateInfo::default().size(desc.bytes).usage(to_vk::BUFFER_USAGE)
+pub(crate) fn buffer_info(device: &Device, desc: BufferDesc) -> vk::BufferCreateInfo<'static> {
+    vk::BufferCreateInfo::default().size(desc.bytes).usage(buffer_usage(device))
+}
+
+fn buffer_usage(device: &Device) -> vk::BufferUsageFlags {
+    match &device.structures {
+        Some(_) => to_vk::BUFFER_USAGE | to_vk::BUILD_USAGE,
+        None => to_vk::BUFFER_USAGE,
+    }
 }
 
 /// How an image is created.
@@ -196,9 +237,18 @@ pub(crate) fn image_info(desc: &ImageDesc, usage: vk::ImageUsageFlags) -> vk::Im
 
 /// A buffer without memory.
 pub(crate) fn create_buffer(device: &Device, what: &str, desc: BufferDesc) -> Result<BufferObject, Error> {
+    create_buffer_for(device, what, desc, buffer_usage(device))
+}
+
+fn create_buffer_for(
+    device: &Device,
+    what: &str,
+    desc: BufferDesc,
+    usage: vk::BufferUsageFlags,
+) -> Result<BufferObject, Error> {
+    let info = buffer_info(device, desc).usage(usage);
     // SAFETY: size and usage are valid: a plan has no empty buffers, and `check_resource` knows the largest.
-    let buffer =
-        unsafe { device.raw.create_buffer(&buffer_info(desc), None) }.making("vkCreateBuffer", what, desc.bytes)?;
+    let buffer = unsafe { device.raw.create_buffer(&info, None) }.making("vkCreateBuffer", what, desc.bytes)?;
     device.set_name(buffer, what);
     Ok(BufferObject { buffer, bytes: desc.bytes })
 }
@@ -301,6 +351,7 @@ pub(crate) unsafe fn destroy(device: &Device, object: &Object) {
     unsafe {
         match object {
             Object::Buffer(buffer) => device.raw.destroy_buffer(buffer.buffer, None),
+            Object::Structure(structure) => structures::destroy(device, structure),
             Object::Image(image) => {
                 if image.base != image.all {
                     device.raw.destroy_image_view(image.base, None);
@@ -321,12 +372,17 @@ pub(crate) fn check_resource(
 ) -> Result<(), Error> {
     let bad = |why: String| Err(Error::BadResource { resource: what.to_owned(), why });
     let limits = &device.info.limits;
+    let buffer_of = |bytes: u64| {
+        let most = limits.max_buffer_bytes;
+        if bytes <= most {
+            return Ok(());
+        }
+        bad(format!("{bytes} bytes are more than a buffer of this device holds, {most}"))
+    };
     match description {
-        Description::Buffer(desc) if desc.bytes > limits.max_buffer_bytes => bad(format!(
-            "{} bytes are more than a buffer of this device holds, {}",
-            desc.bytes, limits.max_buffer_bytes
-        )),
-        Description::Buffer(_) => Ok(()),
+        Description::Buffer(desc) => buffer_of(desc.bytes),
+        Description::Structure(desc) => buffer_of(structures::sizes(device, what, desc)?.structure),
+        Description::Scratch(desc) => buffer_of(structures::sizes(device, what, desc)?.scratch),
         Description::Image(desc) => {
             if desc.extent.depth > 1 && desc.layers > 0 {
                 return bad("a volume has no layers".to_owned());

@@ -67,7 +67,9 @@ impl Pipelines {
             return Err(Error::BadPass { pass: pass.to_owned(), why });
         }
         if let Some(feature) = capabilities(shader).find(|feature| !self.device.has(*feature)) {
-            let what = format!("the shader needs {}, which this device lacks; use another method", feature.name());
+            let instead =
+                if feature == Feature::RayQuery { "the occlusion of Mica's own trees" } else { "another method" };
+            let what = format!("the shader needs {}, which this device lacks; use {instead}", feature.name());
             return Err(Error::Unsupported { pass: pass.to_owned(), what });
         }
         let name = if shader.variant.is_empty() {
@@ -287,6 +289,7 @@ fn capabilities(shader: &Shader) -> impl Iterator<Item = Feature> {
     declared.filter_map(|pair| match pair[1] {
         10 => Some(Feature::Float64),
         11 => Some(Feature::Int64),
+        4472 => Some(Feature::RayQuery),
         _ => None,
     })
 }

@@ -6,11 +6,15 @@
 use crate::descriptors::write_set;
 use crate::device::Device;
 use crate::error::Error;
-use crate::memory::{ImageObject, Object};
+use crate::memory::{BufferObject, ImageObject, Object};
 use crate::pipeline::{Attachments, Pipeline, Pipelines};
+use crate::structures::{self, Build, INDEX_BYTES, StructureObject, VERTEX_BYTES};
 use crate::vulkan_types as to_vk;
 use ash::vk;
-use mica_graph::{Access, Download, Draw, Extent, Pass, Plan, ResourceId, Shader, Slot, Stage, Use, Work};
+use mica_graph::{
+    Access, Description, Download, Draw, Extent, MeshRange, Pass, Plan, ResourceId, Shader, Slot, Stage, StructureDesc,
+    StructureInstance, Use, Work,
+};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 
@@ -37,6 +41,13 @@ pub(crate) enum Command<'a> {
         bytes: Range<usize>,
         data: &'a [u8],
     },
+    /// Some bytes of staging memory into a part of a buffer.
+    Update {
+        to: vk::Buffer,
+        offset: u64,
+        bytes: Range<usize>,
+        data: &'a [u8],
+    },
     /// A resource into some bytes of staging memory.
     Download {
         from: Object,
@@ -50,6 +61,21 @@ pub(crate) enum Command<'a> {
     Fill {
         to: Object,
         word: u32,
+    },
+    /// Bottom levels, and the first of the queries for what they need once they are compacted.
+    BuildMeshes {
+        builds: Vec<Build>,
+        first_query: u32,
+    },
+    /// A top level, from records in staging memory.
+    BuildInstances {
+        build: Build,
+        records: Vec<u8>,
+        bytes: Range<usize>,
+    },
+    Compact {
+        from: vk::AccelerationStructureKHR,
+        to: vk::AccelerationStructureKHR,
     },
 }
 
@@ -70,6 +96,8 @@ pub(crate) struct Targets {
 pub(crate) struct Prepared<'a> {
     pub(crate) commands: Vec<Command<'a>>,
     pub(crate) staging_bytes: usize,
+    /// Queries for sizes of compacted structures.
+    pub(crate) size_queries: u32,
 }
 
 /// Bytes at the start of staging memory where isolated frames note which pass has begun, by its index plus 1. It is read
@@ -87,9 +115,11 @@ pub(crate) fn prepare<'a>(
     plan: &'a Plan,
     objects: &HashMap<ResourceId, Object>,
 ) -> Result<Prepared<'a>, Error> {
-    let mut prepared = Prepared { commands: Vec::with_capacity(plan.passes.len()), staging_bytes: MARKER_BYTES };
+    let commands = Vec::with_capacity(plan.passes.len());
+    let mut prepared = Prepared { commands, staging_bytes: MARKER_BYTES, size_queries: 0 };
     for pass in &plan.passes {
-        let mut context = Preparation { device, pipelines, pool, pass, objects, staging: &mut prepared.staging_bytes };
+        let (staging, size_queries) = (&mut prepared.staging_bytes, &mut prepared.size_queries);
+        let mut context = Preparation { device, pipelines, pool, pass, objects, staging, size_queries };
         let command = context.command()?;
         prepared.commands.push(command);
     }
@@ -104,6 +134,7 @@ pub(crate) struct Preparation<'a, 'b> {
     pub(crate) pass: &'a Pass,
     objects: &'b HashMap<ResourceId, Object>,
     staging: &'b mut usize,
+    size_queries: &'b mut u32,
 }
 
 impl<'a> Preparation<'a, '_> {
@@ -148,6 +179,15 @@ impl<'a> Preparation<'a, '_> {
                 }
                 Ok(Command::Upload { to: self.object(used)?, bytes: self.stage(used)?, data })
             }
+            Work::Update { data, offset } => {
+                let used = self.used_as(Access::TransferUpdate)?;
+                let (to, count) = (self.buffer(used)?, data.len() as u64);
+                if count == 0 || offset.checked_add(count).is_none_or(|end| end > to.bytes) {
+                    return Err(self.bad_use(used, "the data is no part of it"));
+                }
+                let bytes = self.stage_bytes(used, count)?;
+                Ok(Command::Update { to: to.buffer, offset: *offset, bytes, data })
+            }
             Work::Download { download } => {
                 let used = self.used_as(Access::TransferRead)?;
                 Ok(Command::Download { from: self.object(used)?, bytes: self.stage(used)?, download: *download })
@@ -167,12 +207,62 @@ impl<'a> Preparation<'a, '_> {
                 }
                 Ok(Command::Fill { to, word: *word })
             }
-            Work::Build => {
-                let what = "acceleration structures need the ray-query body, which this build of Mica does not have; \
-                            use the occlusion of its own trees";
-                Err(Error::Unsupported { pass: self.pass.name.clone(), what: what.to_owned() })
+            Work::BuildMeshes { meshes } => self.build_meshes(meshes),
+            Work::BuildInstances { instances } => self.build_instances(instances),
+            Work::Compact => {
+                let (from, to) = (self.used_as(Access::BuildRead)?, self.used_as(Access::BuildWrite)?);
+                Ok(Command::Compact { from: self.structure(from)?.raw, to: self.structure(to)?.raw })
             }
         }
+    }
+
+    fn build_meshes(&mut self, meshes: &[MeshRange]) -> Result<Command<'a>, Error> {
+        let [indices, positions, written @ ..] = &self.pass.uses[..] else {
+            return Err(self.bad_pass("it uses no indices and positions".to_owned()));
+        };
+        let (pairs, rest) = written.as_chunks::<2>();
+        if !rest.is_empty() || pairs.len() != meshes.len() {
+            return Err(self.bad_pass(format!("{} uses do not make {} builds", written.len(), meshes.len())));
+        }
+        let read = [self.buffer(indices)?, self.buffer(positions)?];
+        let addresses = read.map(|buffer| structures::address(self.device, buffer.buffer));
+        let mut builds = Vec::with_capacity(meshes.len());
+        for ([structure, scratch], range) in pairs.iter().zip(meshes) {
+            let Description::Structure(StructureDesc::Triangles(desc)) = &structure.resource.description else {
+                return Err(self.bad_use(structure, "it is not made over triangles"));
+            };
+            let first = [u64::from(range.first_index) * INDEX_BYTES, u64::from(range.first_vertex) * VERTEX_BYTES];
+            let counts = [3 * u64::from(desc.triangles) * INDEX_BYTES, u64::from(desc.vertices) * VERTEX_BYTES];
+            if (0..2).any(|which| first[which] + counts[which] > read[which].bytes) {
+                return Err(self.bad_use(structure, "its mesh does not lie within the indices and positions"));
+            }
+            let to = self.structure(structure)?;
+            let addresses = [addresses[0] + first[0], addresses[1] + first[1]];
+            builds.push(Build::over_triangles(self.device, desc, addresses, &to, self.buffer(scratch)?));
+        }
+        let first_query = *self.size_queries;
+        *self.size_queries += builds.len() as u32;
+        Ok(Command::BuildMeshes { builds, first_query })
+    }
+
+    fn build_instances(&mut self, instances: &[StructureInstance]) -> Result<Command<'a>, Error> {
+        let [.., to, scratch] = &self.pass.uses[..] else {
+            return Err(self.bad_pass("it uses no structure and no scratch".to_owned()));
+        };
+        let count = match &to.resource.description {
+            Description::Structure(StructureDesc::Instances { count }) if *count as usize == instances.len() => *count,
+            _ => return Err(self.bad_use(to, &format!("it is not made over {} instances", instances.len()))),
+        };
+        let address = |instance: &StructureInstance| match self.objects.get(&instance.structure) {
+            Some(Object::Structure(structure)) => Some(structure.address),
+            _ => None,
+        };
+        let Some(records) = structures::instance_records(instances, address) else {
+            return Err(self.bad_pass("an instance has no bottom level, or an index of more than 24 bits".to_owned()));
+        };
+        let build = Build::over_instances(self.device, count, &self.structure(to)?, self.buffer(scratch)?);
+        let bytes = self.stage_bytes(to, records.len() as u64)?;
+        Ok(Command::BuildInstances { build, records, bytes })
     }
 
     /// Whether the resource was made for its use.
@@ -181,10 +271,16 @@ impl<'a> Preparation<'a, '_> {
             used.access,
             Access::Uniform | Access::IndirectRead | Access::BuildRead | Access::BuildWrite | Access::Traverse
         );
+        let structures_also = matches!(used.access, Access::BuildRead | Access::BuildWrite);
         let images_only = matches!(used.access, Access::Sampled | Access::ColorWrite | Access::DepthWrite);
         match self.object(used)? {
             Object::Image(_) if buffers_only => Err(self.bad_use(used, "it is an image")),
-            Object::Buffer(_) if images_only => Err(self.bad_use(used, "it is a buffer")),
+            Object::Buffer(_) if images_only || used.access == Access::Traverse => {
+                Err(self.bad_use(used, "it is a buffer"))
+            }
+            Object::Structure(_) if !structures_also && used.access != Access::Traverse => {
+                Err(self.bad_use(used, "it is an acceleration structure"))
+            }
             Object::Image(image) if !image.usage.contains(to_vk::image_usage(&BTreeSet::from([used.access]))) => {
                 let why = format!("this device has no {:?} images for {:?}", image.desc.format, used.access);
                 Err(self.bad_use(used, &why))
@@ -247,8 +343,12 @@ impl<'a> Preparation<'a, '_> {
 
     /// Takes room for a resource in staging memory.
     fn stage(&mut self, used: &Use) -> Result<Range<usize>, Error> {
+        self.stage_bytes(used, used.resource.bytes())
+    }
+
+    fn stage_bytes(&mut self, used: &Use, bytes: u64) -> Result<Range<usize>, Error> {
         let from = self.staging.next_multiple_of(STAGING_ALIGNMENT);
-        let to = usize::try_from(used.resource.bytes()).ok().and_then(|bytes| from.checked_add(bytes));
+        let to = usize::try_from(bytes).ok().and_then(|bytes| from.checked_add(bytes));
         let to = to.ok_or_else(|| self.bad_use(used, "it is larger than the memory of this machine"))?;
         *self.staging = to;
         Ok(from..to)
@@ -256,6 +356,20 @@ impl<'a> Preparation<'a, '_> {
 
     pub(crate) fn object(&self, used: &Use) -> Result<Object, Error> {
         self.objects.get(&used.resource.id).copied().ok_or_else(|| self.bad_use(used, "the plan does not know it"))
+    }
+
+    fn buffer(&self, used: &Use) -> Result<BufferObject, Error> {
+        match self.object(used)? {
+            Object::Buffer(buffer) => Ok(buffer),
+            _ => Err(self.bad_use(used, "it is not a buffer")),
+        }
+    }
+
+    fn structure(&self, used: &Use) -> Result<StructureObject, Error> {
+        match self.object(used)? {
+            Object::Structure(structure) => Ok(structure),
+            _ => Err(self.bad_use(used, "it is not an acceleration structure")),
+        }
     }
 
     fn used_as(&self, access: Access) -> Result<&'a Use, Error> {

@@ -4,6 +4,7 @@ use crate::device::{Device, c_string};
 use crate::memory::{ImageObject, Object};
 use crate::prepare::{Command, Program, Targets};
 use crate::resources::Brought;
+use crate::structures::{self, Build};
 use crate::timing::Timing;
 use crate::vulkan_types as to_vk;
 use ash::vk;
@@ -20,6 +21,8 @@ pub(crate) struct Recording<'a> {
     pub(crate) staging: vk::Buffer,
     /// Timestamp queries and their number; `None` where no time is measured.
     pub(crate) timestamps: Option<(vk::QueryPool, u32)>,
+    /// Queries for sizes of compacted structures and their number.
+    pub(crate) sizes: Option<(vk::QueryPool, u32)>,
     pub(crate) timing: Timing,
     /// Persistent images that no frame has used yet.
     pub(crate) undefined: &'a [ImageObject],
@@ -45,7 +48,7 @@ impl Recording<'_> {
     pub(crate) unsafe fn record(&self) {
         // SAFETY: as the caller promises, for this and everything below it.
         unsafe {
-            if let Some((pool, count)) = self.timestamps.filter(|(_, count)| *count > 0) {
+            for (pool, count) in [self.timestamps, self.sizes].into_iter().flatten().filter(|(_, count)| *count > 0) {
                 self.device.raw.cmd_reset_query_pool(self.to, pool, 0, count);
             }
             self.open();
@@ -164,7 +167,7 @@ impl Recording<'_> {
             .filter_map(|id| self.objects.get(id))
             .filter_map(|object| match object {
                 Object::Image(image) => Some(image),
-                Object::Buffer(_) => None,
+                _ => None,
             })
             .map(|image| {
                 // The stages that wait are waited for too: where nothing in this frame comes first, that chains the
@@ -212,9 +215,17 @@ impl Recording<'_> {
                 }
                 Command::Raster { program, draws, extent, targets } => self.raster(program, draws, *extent, targets),
                 Command::Upload { to, bytes, .. } => self.upload(to, bytes.start as u64),
+                Command::Update { to, offset, bytes, .. } => {
+                    let (src_offset, size) = (bytes.start as u64, bytes.len() as u64);
+                    let region = vk::BufferCopy { src_offset, dst_offset: *offset, size };
+                    device.cmd_copy_buffer(self.to, self.staging, *to, &[region]);
+                }
                 Command::Download { from, bytes, .. } => self.download(from, bytes.start as u64),
                 Command::Copy { from, to } => self.copy(from, to),
                 Command::Fill { to, word } => self.fill(to, *word),
+                Command::BuildMeshes { builds, first_query } => self.build_meshes(builds, *first_query),
+                Command::BuildInstances { build, bytes, .. } => self.build_instances(build, bytes.start as u64),
+                Command::Compact { from, to } => self.compact(*from, *to),
             }
             if let Some(debug_utils) = &self.device.debug_utils {
                 debug_utils.cmd_end_debug_utils_label(self.to);
@@ -280,6 +291,42 @@ impl Recording<'_> {
         }
     }
 
+    /// Builds, and then asks for the sizes that compaction would leave.
+    unsafe fn build_meshes(&self, builds: &[Build], first_query: u32) {
+        let Some(support) = &self.device.structures else { return };
+        // SAFETY: as the caller promises.
+        unsafe {
+            structures::record(support, self.to, &builds.iter().collect::<Vec<_>>());
+            if let Some((pool, _)) = self.sizes {
+                let memory = [vk::MemoryBarrier2::default()
+                    .src_stage_mask(vk::PipelineStageFlags2::ACCELERATION_STRUCTURE_BUILD_KHR)
+                    .src_access_mask(vk::AccessFlags2::ACCELERATION_STRUCTURE_WRITE_KHR)
+                    .dst_stage_mask(vk::PipelineStageFlags2::ACCELERATION_STRUCTURE_BUILD_KHR)
+                    .dst_access_mask(vk::AccessFlags2::ACCELERATION_STRUCTURE_READ_KHR)];
+                let built = vk::DependencyInfo::default().memory_barriers(&memory);
+                self.device.raw.cmd_pipeline_barrier2(self.to, &built);
+                let all: Vec<vk::AccelerationStructureKHR> = builds.iter().map(Build::to).collect();
+                let kind = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
+                support.functions.cmd_write_acceleration_structures_properties(self.to, &all, kind, pool, first_query);
+            }
+        }
+    }
+
+    unsafe fn build_instances(&self, build: &Build, offset: u64) {
+        let Some(support) = &self.device.structures else { return };
+        let build = build.read_instances_at(structures::address(self.device, self.staging) + offset);
+        // SAFETY: as the caller promises; staging memory holds the records from the offset on.
+        unsafe { structures::record(support, self.to, &[&build]) };
+    }
+
+    unsafe fn compact(&self, from: vk::AccelerationStructureKHR, to: vk::AccelerationStructureKHR) {
+        let Some(support) = &self.device.structures else { return };
+        let mode = vk::CopyAccelerationStructureModeKHR::COMPACT;
+        let info = vk::CopyAccelerationStructureInfoKHR::default().src(from).dst(to).mode(mode);
+        // SAFETY: as the caller promises; the copy is as large as the device said, or as the original.
+        unsafe { support.functions.cmd_copy_acceleration_structure(self.to, &info) };
+    }
+
     unsafe fn upload(&self, to: &Object, offset: u64) {
         let device = &self.device.raw;
         // SAFETY: as the caller promises; staging memory holds the whole resource from the offset on.
@@ -294,6 +341,8 @@ impl Recording<'_> {
                     let layout = vk::ImageLayout::GENERAL;
                     device.cmd_copy_buffer_to_image(self.to, self.staging, image.image, layout, &regions);
                 }
+                // Refused when the pass was prepared, here and below.
+                Object::Structure(_) => {}
             }
         }
     }
@@ -312,6 +361,7 @@ impl Recording<'_> {
                     let layout = vk::ImageLayout::GENERAL;
                     device.cmd_copy_image_to_buffer(self.to, image.image, layout, self.staging, &regions);
                 }
+                Object::Structure(_) => {}
             }
         }
     }
@@ -350,6 +400,7 @@ impl Recording<'_> {
         unsafe {
             match to {
                 Object::Buffer(buffer) => device.cmd_fill_buffer(self.to, buffer.buffer, 0, vk::WHOLE_SIZE, word),
+                Object::Structure(_) => {}
                 Object::Image(image) => {
                     let (layout, range) = (vk::ImageLayout::GENERAL, [to_vk::whole_image(&image.desc)]);
                     if range[0].aspect_mask == vk::ImageAspectFlags::DEPTH {

@@ -7,12 +7,15 @@ use crate::borrow::{HostBuffer, HostImage};
 use crate::device::Device;
 use crate::error::Error;
 use crate::memory::{self, BufferObject, ImageObject, Memory, Object};
+use crate::structures;
 use crate::vulkan_types as to_vk;
 use ash::vk;
 use frame_memory::Shared;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;
-use mica_graph::{Access, Description, ImageDesc, Lifetime, Placement, Plan, Resource, ResourceId, Usage};
+use mica_graph::{
+    Access, BufferDesc, Description, ImageDesc, Lifetime, Placement, Plan, Resource, ResourceId, StructureDesc, Usage,
+};
 use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
 use std::sync::{Arc, Weak};
@@ -48,6 +51,8 @@ struct Persistent {
     last_frame: u64,
     /// The frame that took it to the general layout; `None` for images that no frame has used yet.
     defined_by: Option<u64>,
+    /// What a bottom level needs once it is compacted; known after the frame that built it.
+    compacted_bytes: Option<u64>,
 }
 
 /// A resource of the host.
@@ -100,18 +105,30 @@ impl Resources {
         }
         memory::check_resource(&self.device, &resource.name, &resource.description, usage)?;
         let mut found = vk::MemoryRequirements2::default();
+        let mut of_buffer = |desc| {
+            let info = memory::buffer_info(&self.device, desc);
+            let query = vk::DeviceBufferMemoryRequirements::default().create_info(&info);
+            // SAFETY: the size is within the device's limit, and not zero as the planner checked.
+            unsafe { self.device.raw.get_device_buffer_memory_requirements(&query, &mut found) };
+        };
         match &resource.description {
+            Description::Buffer(desc) => of_buffer(*desc),
+            Description::Scratch(desc) => {
+                of_buffer(BufferDesc { bytes: structures::sizes(&self.device, &resource.name, desc)?.scratch });
+            }
+            Description::Structure(_) if resource.lifetime == Lifetime::Frame => {
+                let why = "an acceleration structure outlives the frame: give it another lifetime".to_owned();
+                return Err(Error::BadResource { resource: resource.name.clone(), why });
+            }
+            Description::Structure(desc) => {
+                let size = self.structure_bytes(&resource.name, desc)?;
+                return Ok(vk::MemoryRequirements { size, alignment: 1, memory_type_bits: 0 });
+            }
             Description::Image(desc) => {
                 let info = memory::image_info(desc, usage);
                 let query = vk::DeviceImageMemoryRequirements::default().create_info(&info);
                 // SAFETY: the driver said that it supports this description.
                 unsafe { self.device.raw.get_device_image_memory_requirements(&query, &mut found) };
-            }
-            Description::Buffer(desc) => {
-                let info = memory::buffer_info(*desc);
-                let query = vk::DeviceBufferMemoryRequirements::default().create_info(&info);
-                // SAFETY: the size is within the device's limit, and not zero as the planner checked.
-                unsafe { self.device.raw.get_device_buffer_memory_requirements(&query, &mut found) };
             }
         }
         let mut found = found.memory_requirements;
@@ -222,10 +239,19 @@ impl Resources {
         }
         let usage = match &resource.description {
             Description::Image(desc) => self.widest_usage(desc),
-            Description::Buffer(_) => vk::ImageUsageFlags::empty(),
+            _ => vk::ImageUsageFlags::empty(),
         };
         memory::check_resource(&self.device, &resource.name, &resource.description, usage)?;
         let (object, allocation) = match &resource.description {
+            Description::Structure(desc) => {
+                let bytes = self.structure_bytes(&resource.name, desc)?;
+                let (structure, allocation) = self.memory.structure(&resource.name, desc, bytes)?;
+                (Object::Structure(structure), allocation)
+            }
+            Description::Scratch(_) => {
+                let why = "working space lasts for its build: give it the lifetime of a frame".to_owned();
+                return Err(Error::BadResource { resource: resource.name.clone(), why });
+            }
             Description::Image(desc) => {
                 let (image, allocation) = self.memory.image(&resource.name, desc, usage)?;
                 (Object::Image(image), allocation)
@@ -237,9 +263,28 @@ impl Resources {
         };
         let row = MemoryRow { name: resource.name.clone(), bytes: allocation.size(), lifetime: resource.lifetime };
         let handle = Arc::downgrade(resource);
-        self.persistent
-            .insert(resource.id, Persistent { handle, row, object, allocation, last_frame: frame, defined_by: None });
+        let (last_frame, defined_by, compacted_bytes) = (frame, None, None);
+        let persistent = Persistent { handle, row, object, allocation, last_frame, defined_by, compacted_bytes };
+        self.persistent.insert(resource.id, persistent);
         Ok(object)
+    }
+
+    /// The bytes of a structure: what the device foresees, or what it said after the build that is to be compacted.
+    fn structure_bytes(&self, what: &str, desc: &StructureDesc) -> Result<u64, Error> {
+        let known = match desc {
+            StructureDesc::Compacted { of, .. } => {
+                self.persistent.get(of).and_then(|original| original.compacted_bytes)
+            }
+            _ => None,
+        };
+        known.map_or_else(|| Ok(structures::sizes(&self.device, what, desc)?.structure), Ok)
+    }
+
+    /// Notes what a bottom level needs once it is compacted.
+    pub(crate) fn note_compacted(&mut self, id: ResourceId, bytes: u64) {
+        if let Some(persistent) = self.persistent.get_mut(&id) {
+            persistent.compacted_bytes = Some(bytes).filter(|bytes| *bytes > 0);
+        }
     }
 
     /// Everything that the device can do with a format: later frames may use the image in ways that this one does not.

@@ -3,6 +3,7 @@
 use crate::device::Device;
 use crate::error::{Call, Error};
 use crate::memory::{self, BufferObject, Memory, Object};
+use crate::structures::SizeQueries;
 use crate::timing::Timestamps;
 use crate::vulkan_types as to_vk;
 use ash::vk;
@@ -19,6 +20,7 @@ pub(crate) struct Slot {
     descriptors: Option<Descriptors>,
     pub(crate) staging: Option<Staging>,
     pub(crate) timestamps: Option<Timestamps>,
+    pub(crate) sizes: Option<SizeQueries>,
 }
 
 struct Descriptors {
@@ -107,6 +109,19 @@ impl Slot {
         Ok(())
     }
 
+    /// Queries for so many sizes of compacted structures.
+    pub(crate) fn ready_sizes(&mut self, device: &Device, count: u32) -> Result<(), Error> {
+        if count == 0 || self.sizes.as_ref().is_some_and(|ready| ready.holds(count)) {
+            return Ok(());
+        }
+        if let Some(old) = self.sizes.take() {
+            // SAFETY: the frame that used the queries is finished.
+            unsafe { device.raw.destroy_query_pool(old.pool, None) };
+        }
+        self.sizes = Some(SizeQueries::new(device, count)?);
+        Ok(())
+    }
+
     fn drop_staging(&mut self, memory: &mut Memory, device: &Device) {
         if let Some(Staging { buffer, allocation }) = self.staging.take() {
             // SAFETY: the frame that used it is finished.
@@ -125,6 +140,9 @@ impl Slot {
             }
             if let Some(timestamps) = self.timestamps.take() {
                 device.raw.destroy_query_pool(timestamps.pool, None);
+            }
+            if let Some(sizes) = self.sizes.take() {
+                device.raw.destroy_query_pool(sizes.pool, None);
             }
         }
     }

@@ -77,7 +77,7 @@ pub(crate) fn image_usage(accesses: &BTreeSet<Access>) -> vk::ImageUsageFlags {
                 Access::ColorWrite => vk::ImageUsageFlags::COLOR_ATTACHMENT,
                 Access::DepthWrite => vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
                 Access::TransferRead => vk::ImageUsageFlags::TRANSFER_SRC,
-                Access::TransferWrite => vk::ImageUsageFlags::TRANSFER_DST,
+                Access::TransferWrite | Access::TransferUpdate => vk::ImageUsageFlags::TRANSFER_DST,
                 // Buffers only; the use itself is refused where the pass is prepared.
                 Access::Uniform | Access::IndirectRead | Access::BuildRead | Access::BuildWrite | Access::Traverse => {
                     vk::ImageUsageFlags::empty()
@@ -92,6 +92,12 @@ pub(crate) const VIEWED: vk::ImageUsageFlags = vk::ImageUsageFlags::from_raw(
         | vk::ImageUsageFlags::SAMPLED.as_raw()
         | vk::ImageUsageFlags::COLOR_ATTACHMENT.as_raw()
         | vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT.as_raw(),
+);
+
+/// What acceleration structures are built from, in addition, where the device has any.
+pub(crate) const BUILD_USAGE: vk::BufferUsageFlags = vk::BufferUsageFlags::from_raw(
+    vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS.as_raw()
+        | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR.as_raw(),
 );
 
 /// What every buffer may be used for: none of it costs anything on a buffer, and who uses it next is not known.
@@ -129,9 +135,9 @@ pub(crate) fn access(access: Access) -> vk::AccessFlags2 {
         Access::ColorWrite => To::COLOR_ATTACHMENT_WRITE,
         Access::DepthWrite => To::DEPTH_STENCIL_ATTACHMENT_READ | To::DEPTH_STENCIL_ATTACHMENT_WRITE,
         Access::TransferRead => To::TRANSFER_READ,
-        Access::TransferWrite => To::TRANSFER_WRITE,
+        Access::TransferWrite | Access::TransferUpdate => To::TRANSFER_WRITE,
         Access::IndirectRead => To::INDIRECT_COMMAND_READ,
-        Access::BuildRead => To::ACCELERATION_STRUCTURE_READ_KHR | To::SHADER_STORAGE_READ,
+        Access::BuildRead => To::ACCELERATION_STRUCTURE_READ_KHR | To::SHADER_READ,
         Access::BuildWrite => To::ACCELERATION_STRUCTURE_READ_KHR | To::ACCELERATION_STRUCTURE_WRITE_KHR,
         Access::Traverse => To::ACCELERATION_STRUCTURE_READ_KHR,
     }
@@ -167,6 +173,7 @@ pub(crate) fn descriptor_type(kind: BindingKind) -> vk::DescriptorType {
         BindingKind::StorageImage => vk::DescriptorType::STORAGE_IMAGE,
         BindingKind::StorageBuffer => vk::DescriptorType::STORAGE_BUFFER,
         BindingKind::UniformBuffer => vk::DescriptorType::UNIFORM_BUFFER,
+        BindingKind::AccelerationStructure => vk::DescriptorType::ACCELERATION_STRUCTURE_KHR,
         BindingKind::Sampler(_) => vk::DescriptorType::SAMPLER,
     }
 }

@@ -163,8 +163,8 @@ fn passes_that_do_not_fit_their_shader_are_refused_and_leave_the_executor_usable
     assert!(matches!(error_of(&mut executor, short, [0, 1], good), Error::BadPass { .. }));
     let many = Work::Compute { shader: *SCALE, params: bytes_of(&[64, 2]), groups: [1, u32::MAX, 1] };
     assert!(matches!(error_of(&mut executor, many, [0, 1], good), Error::BadPass { .. }));
-    let build = error_of(&mut executor, Work::Build, [0, 1], [Access::StorageRead, Access::StorageWrite]);
-    assert!(matches!(&build, Error::Unsupported { pass, .. } if pass == "scale"), "{build:?}");
+    let compact = error_of(&mut executor, Work::Compact, [0, 1], [Access::BuildRead, Access::BuildWrite]);
+    assert!(matches!(&compact, Error::BadUse { resource, .. } if resource == "from"), "{compact:?}");
 
     let mut graph = Graph::new();
     let to = whole(&mut graph, scale_work(64, 2), [0, 1], good);

@@ -11,5 +11,6 @@ mod memory;
 mod pipelines;
 mod random;
 mod raster;
+mod structures;
 mod timing;
 mod transfers;

@@ -23,6 +23,32 @@ fn texels(desc: &ImageDesc) -> Vec<u8> {
 }
 
 #[test]
+fn an_update_changes_its_part_of_a_buffer_and_nothing_else() {
+    let checked = Checked::new();
+    let mut executor = checked.executor();
+    let mut kept = Buffer::new("kept", 32, Lifetime::Scene);
+    let mut graph = Graph::new();
+    graph.upload(&mut kept, bytes_of(&[1, 2, 3, 4, 5, 6, 7, 8]));
+    executor.run(graph, Timing::Overlapped).expect("the frame runs");
+    let mut graph = Graph::new();
+    graph.update(&mut kept, 8, bytes_of(&[30, 40]));
+    graph.update(&mut kept, 28, bytes_of(&[80]));
+    let download = graph.download(&kept);
+    let mut run = executor.run(graph, Timing::Overlapped).expect("the frame runs");
+    assert_eq!(words(&run.take(download)), [1, 2, 30, 40, 5, 6, 7, 80]);
+
+    // What is declared by hand is checked once more.
+    for (data, offset) in [(vec![0; 8], 28), (vec![0; 4], u64::MAX), (Vec::new(), 0)] {
+        let mut graph = Graph::new();
+        let (slot, access, stages) = (Slot::None, Access::TransferUpdate, Stages::TRANSFER);
+        let uses = vec![Use { resource: kept.resource().clone(), slot, access, stages }];
+        graph.push("update", Work::Update { data: data.into(), offset }, uses);
+        let error = executor.run(graph, Timing::Overlapped).expect_err("there is no such part");
+        assert!(matches!(&error, Error::BadUse { resource, .. } if resource == "kept"), "{error}");
+    }
+}
+
+#[test]
 fn images_with_levels_and_layers_come_back_as_they_went() {
     let checked = Checked::new();
     let mut executor = checked.executor();

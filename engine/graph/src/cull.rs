@@ -40,7 +40,7 @@ fn replaces_all(used: &Use) -> bool {
         Access::TransferWrite | Access::BuildWrite => true,
         Access::ColorWrite | Access::DepthWrite => match &used.resource.description {
             Description::Image(image) => image.mips == 1 && image.layers <= 1,
-            Description::Buffer(_) => false,
+            _ => false,
         },
         _ => false,
     }

@@ -2,6 +2,7 @@
 
 use crate::resource::{Buffer, Extent, Format, Image, ImageDesc, Lifetime, Resource};
 use crate::shader::{Access, Bind, Shader, Slot, Stages};
+use crate::structure::{MeshRange, StructureInstance};
 use std::sync::Arc;
 
 /// One resource in one pass.
@@ -63,6 +64,13 @@ pub enum Work {
         /// The bytes; for images as in [`ImageDesc::bytes`].
         data: Arc<[u8]>,
     },
+    /// Copies bytes of the host into a part of a buffer.
+    Update {
+        /// The bytes.
+        data: Arc<[u8]>,
+        /// Where in the buffer the first of them goes.
+        offset: u64,
+    },
     /// Copies a whole resource to the host.
     Download {
         /// What the result is asked for by.
@@ -75,8 +83,19 @@ pub enum Work {
         /// The word.
         word: u32,
     },
-    /// Builds an acceleration structure from the buffers used as [`Access::BuildRead`].
-    Build,
+    /// Builds bottom levels over triangles. Its uses are indices, positions, and then in turn each structure and its
+    /// scratch.
+    BuildMeshes {
+        /// Where each lies in the two buffers.
+        meshes: Arc<[MeshRange]>,
+    },
+    /// Builds a top level. Its uses are the bottom levels, each once, then the structure and its scratch.
+    BuildInstances {
+        /// Each placement.
+        instances: Arc<[StructureInstance]>,
+    },
+    /// Copies a bottom level into one without spare room.
+    Compact,
 }
 
 impl Work {
@@ -180,6 +199,18 @@ impl Graph {
         self.upload_resource(&buffer.resource, data.into());
     }
 
+    /// Copies `data` into `buffer` from byte `offset` on, and leaves the rest of it as it is.
+    ///
+    /// # Panics
+    /// If there is no such part of the buffer: a mistake of the pass's author, not of any input.
+    pub fn update(&mut self, buffer: &mut Buffer, offset: u64, data: impl Into<Arc<[u8]>>) {
+        let (resource, data) = (&buffer.resource, data.into());
+        let end = offset.saturating_add(data.len() as u64);
+        assert!(end <= buffer.desc.bytes, "update of {}: it has no bytes {offset}..{end}", resource.name);
+        let uses = vec![transfer(resource, Access::TransferUpdate)];
+        self.push(format!("update {}", resource.name), Work::Update { data, offset }, uses);
+    }
+
     /// Copies `data` into the whole of `image`, laid out as in [`ImageDesc::bytes`].
     ///
     /// # Panics
@@ -232,20 +263,6 @@ impl Graph {
     pub fn clear(&mut self, image: &mut Image, value: f32) {
         let uses = vec![transfer(&image.resource, Access::TransferWrite)];
         self.push(format!("clear {}", image.resource.name), Work::Fill { word: value.to_bits() }, uses);
-    }
-
-    /// Builds an acceleration structure held in `structure` from `inputs`, with `scratch` as working space.
-    pub fn build(&mut self, name: impl Into<String>, inputs: &[&Buffer], structure: &mut Buffer, scratch: &mut Buffer) {
-        let build = |buffer: &Buffer, access| Use {
-            resource: buffer.resource.clone(),
-            slot: Slot::None,
-            access,
-            stages: Stages::BUILD,
-        };
-        let mut uses: Vec<Use> = inputs.iter().map(|input| build(input, Access::BuildRead)).collect();
-        uses.push(build(structure, Access::BuildWrite));
-        uses.push(build(scratch, Access::BuildWrite));
-        self.push(name, Work::Build, uses);
     }
 
     /// Keeps an image of this frame, and what it is made from, from being culled: the host reads it.

@@ -42,6 +42,7 @@ mod plan;
 mod print;
 mod resource;
 mod shader;
+mod structure;
 mod synchronize;
 
 pub use check::PlanError;
@@ -49,3 +50,4 @@ pub use declare::{Download, Draw, Graph, Pass, Use, Work};
 pub use plan::{Barrier, Placement, Plan, Requirements, Step, Usage};
 pub use resource::{Buffer, BufferDesc, Description, Extent, Format, Image, ImageDesc, Lifetime, Resource, ResourceId};
 pub use shader::{Access, Bind, Binding, BindingKind, Sampler, Shader, Slot, Stage, StageCode, Stages};
+pub use structure::{MeshRange, Structure, StructureDesc, StructureInstance, TrianglesDesc};

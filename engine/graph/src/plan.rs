@@ -4,7 +4,7 @@ use crate::check::{PlanError, check};
 use crate::cull::cull;
 use crate::declare::{Graph, Pass};
 use crate::place::{Block, share, side_by_side};
-use crate::resource::{Lifetime, Resource, ResourceId};
+use crate::resource::{Description, Lifetime, Resource, ResourceId};
 use crate::shader::{Access, Stages};
 use crate::synchronize::synchronize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,6 +28,8 @@ pub struct Usage {
     pub accesses: BTreeSet<Access>,
     /// First and last pass that uses it, as indices into [`Plan::passes`].
     pub passes: (usize, usize),
+    /// Bytes of its content: tightly packed, or what the device said of acceleration structures and their scratch.
+    pub bytes: u64,
     /// Where it lies: `Some` for resources of [`Lifetime::Frame`].
     pub placement: Option<Placement>,
 }
@@ -97,7 +99,8 @@ impl Plan {
     /// Plans a frame: leaves out passes that nobody needs, gives every resource of [`Lifetime::Frame`] its bytes in one
     /// memory that they share, and puts a barrier wherever two passes conflict that no earlier barrier orders.
     ///
-    /// `requirements` is asked once for each resource of [`Lifetime::Frame`] that is left, with all its accesses.
+    /// `requirements` is asked once for each resource of [`Lifetime::Frame`] that is left, with all its accesses, and for
+    /// each acceleration structure.
     /// The same declarations give the same plan.
     ///
     /// # Errors
@@ -123,7 +126,8 @@ fn usages(passes: &[Pass]) -> Vec<Usage> {
     for (pass, used) in passes.iter().enumerate().flat_map(|(pass, it)| it.uses.iter().map(move |used| (pass, used))) {
         let index = *index_of.entry(used.resource.id).or_insert_with(|| {
             let resource = used.resource.clone();
-            usages.push(Usage { resource, accesses: BTreeSet::new(), passes: (pass, pass), placement: None });
+            let (accesses, bytes) = (BTreeSet::new(), resource.bytes());
+            usages.push(Usage { resource, accesses, passes: (pass, pass), bytes, placement: None });
             usages.len() - 1
         });
         usages[index].accesses.insert(used.access);
@@ -139,6 +143,9 @@ fn place(
     passes: usize,
     requirements: &dyn Fn(&Resource, &BTreeSet<Access>) -> Requirements,
 ) -> Result<(u64, u64), PlanError> {
+    for usage in usages.iter_mut().filter(|usage| matches!(usage.resource.description, Description::Structure(_))) {
+        usage.bytes = requirements(&usage.resource, &usage.accesses).bytes;
+    }
     let mut frame: Vec<&mut Usage> =
         usages.iter_mut().filter(|usage| usage.resource.lifetime == Lifetime::Frame).collect();
     let blocks: Vec<Block> = frame
@@ -153,6 +160,9 @@ fn place(
     let unshared = side_by_side(&blocks).map_err(too_large)?;
     let layout = share(&blocks).map_err(too_large)?;
     for ((usage, block), &offset) in frame.iter_mut().zip(&blocks).zip(&layout.offsets) {
+        if matches!(usage.resource.description, Description::Scratch(_)) {
+            usage.bytes = block.bytes;
+        }
         usage.placement = Some(Placement { offset, bytes: block.bytes });
     }
     Ok((layout.bytes, unshared))

@@ -63,7 +63,7 @@ impl Plan {
         for usage in &self.resources {
             let (bytes, placed) = match usage.placement {
                 Some(place) => (place.bytes, format!("{}..{}", place.offset, place.offset + place.bytes)),
-                None => (usage.resource.bytes(), "own memory".to_owned()),
+                None => (usage.bytes, "own memory".to_owned()),
             };
             let exported = if self.exports.contains(&usage.resource.id) { "exported" } else { "" };
             table.push([

@@ -1,5 +1,6 @@
 //! Images and buffers: handles that say what a resource is, not where it lies.
 
+use crate::structure::StructureDesc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -140,13 +141,17 @@ impl Lifetime {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ResourceId(pub u64);
 
-/// What an image and a buffer differ in.
+/// What resources differ in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Description {
     /// An image.
     Image(ImageDesc),
     /// A buffer.
     Buffer(BufferDesc),
+    /// An acceleration structure.
+    Structure(StructureDesc),
+    /// Working space for a build of such a structure.
+    Scratch(StructureDesc),
 }
 
 /// What stands behind a handle. Executors key their memory by [`Resource::id`] and may free it once no handle is left.
@@ -163,17 +168,18 @@ pub struct Resource {
 }
 
 impl Resource {
-    fn new(name: impl Into<String>, description: Description, lifetime: Lifetime) -> Arc<Self> {
+    pub(crate) fn new(name: impl Into<String>, description: Description, lifetime: Lifetime) -> Arc<Self> {
         static NEXT: AtomicU64 = AtomicU64::new(1);
         let id = ResourceId(NEXT.fetch_add(1, Ordering::Relaxed));
         Arc::new(Self { id, name: name.into(), description, lifetime })
     }
 
-    /// The bytes its content takes, tightly packed.
+    /// The bytes its content takes, tightly packed; a guess for what only the device knows the size of.
     pub fn bytes(&self) -> u64 {
         match &self.description {
             Description::Image(image) => image.bytes(),
             Description::Buffer(buffer) => buffer.bytes,
+            Description::Structure(structure) | Description::Scratch(structure) => structure.bytes(),
         }
     }
 }

@@ -91,8 +91,10 @@ pub enum Access {
     DepthWrite,
     /// A copy reads.
     TransferRead,
-    /// A copy or a fill writes.
+    /// A copy or a fill writes all of it.
     TransferWrite,
+    /// A copy writes a part of it, and the rest stays.
+    TransferUpdate,
     /// Arguments of an indirect dispatch are read.
     IndirectRead,
     /// An acceleration-structure build reads its inputs.
@@ -113,6 +115,7 @@ impl Access {
                 | Self::ColorWrite
                 | Self::DepthWrite
                 | Self::TransferWrite
+                | Self::TransferUpdate
                 | Self::BuildWrite
         )
     }
@@ -148,6 +151,8 @@ pub enum BindingKind {
     StorageBuffer,
     /// A uniform buffer.
     UniformBuffer,
+    /// The top level of an acceleration structure.
+    AccelerationStructure,
     /// A sampler; the executor supplies it.
     Sampler(Sampler),
 }

@@ -54,6 +54,8 @@ impl FilledImage {
 pub(crate) struct SceneBuffers {
     /// Scene space is world space about this point.
     pub center: DVec3,
+    /// The power of two that the scene fits into about its centre.
+    pub scene_unit: f32,
     /// Each instance of a mesh, one draw.
     pub draws: Arc<[Draw]>,
     pub instances: Filled,
@@ -148,6 +150,7 @@ impl SceneBuffers {
         let materials_bytes = (base_materials.len().max(1) * size_of::<types::Material>()) as u64;
         Ok(Self {
             center,
+            scene_unit: scene_unit(scene, center),
             draws: draws.into(),
             instances: Filled::new("instances", &instances),
             indices: Filled::new("indices", &indices),
@@ -240,6 +243,12 @@ impl SceneBuffers {
             self.uploaded_materials = Some(bytes);
         }
     }
+}
+
+/// The least power of two that no coordinate of the scene exceeds, about its centre; 1 for a scene of points or nothing.
+fn scene_unit(scene: &Scene, center: DVec3) -> f32 {
+    let reach = scene.bounds().map_or(0.0, |bounds| (bounds.max - center).max_element());
+    if reach > 0.0 { reach.log2().ceil().clamp(-100.0, 100.0).exp2() as f32 } else { 1.0 }
 }
 
 /// The elements, and zeros up to `count`.

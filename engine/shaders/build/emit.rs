@@ -197,7 +197,7 @@ fn emit_bind_trait(rust: &mut String, unit: &Unit, structs: &Structs) {
 /// One field of `Bind`.
 struct Resource {
     field: String,
-    /// `Image` or `Buffer`.
+    /// `Image`, `Buffer` or `Structure`.
     handle: &'static str,
     writes: bool,
     slot: String,
@@ -216,11 +216,13 @@ fn resources(unit: &Unit) -> Vec<Resource> {
             Kind::Sampler(_) => continue,
             Kind::SampledImage => ("Image", "a texture".to_owned()),
             Kind::StorageImage => ("Image", "an image".to_owned()),
+            Kind::AccelerationStructure => ("Structure", "an acceleration structure".to_owned()),
             Kind::UniformBuffer => ("Buffer", buffer_content("a uniform buffer", binding.block.as_ref())),
             Kind::StorageBuffer => ("Buffer", buffer_content("a buffer", binding.block.as_ref())),
         };
         let verb = match binding.access {
             Access::Sampled | Access::Uniform | Access::StorageRead => "read",
+            Access::Traverse => "traversed",
             Access::StorageWrite => "written",
             Access::StorageReadWrite => "read and written",
         };

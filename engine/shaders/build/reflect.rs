@@ -25,6 +25,8 @@ pub enum Kind {
     StorageBuffer,
     /// A `uniform` block.
     UniformBuffer,
+    /// What ray queries are asked of.
+    AccelerationStructure,
     /// A sampler, with its name in `mica_graph::Sampler`.
     Sampler(&'static str),
 }
@@ -42,6 +44,8 @@ pub enum Access {
     StorageWrite,
     /// Neither.
     StorageReadWrite,
+    /// Acceleration structures.
+    Traverse,
 }
 
 impl Access {
@@ -285,7 +289,7 @@ fn opaque(module: &Module, variable: &Variable, name: &str, ty: &Type) -> Result
         Type::Array { .. } | Type::RuntimeArray { .. } => {
             Err(format!("`{name}` is an array of descriptors: declare one, or an array texture"))
         }
-        Type::AccelerationStructure => Err(format!("`{name}` is an acceleration structure, which Bind cannot hold")),
+        Type::AccelerationStructure => Ok((Kind::AccelerationStructure, Access::Traverse)),
         _ => Err(format!("`{name}` is of a kind that Bind cannot hold")),
     }
 }

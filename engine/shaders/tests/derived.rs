@@ -6,10 +6,11 @@ mod shaders {
 }
 
 use mica_graph::Access::{
-    ColorWrite, DepthWrite, Sampled, StorageRead, StorageReadWrite, StorageWrite, Uniform as UniformRead,
+    ColorWrite, DepthWrite, Sampled, StorageRead, StorageReadWrite, StorageWrite, Traverse, Uniform as UniformRead,
 };
 use mica_graph::{
     Access, Bind, BindingKind, Buffer, Extent, Format, Image, ImageDesc, Lifetime, Sampler, Shader, Slot, Stages,
+    Structure,
 };
 use shaders::types::{Camera, Particle, Range, Spin, Table};
 use shaders::{access, constants, counts, glints, layouts, mesh, tonemap};
@@ -39,6 +40,7 @@ fn a_bind_visits_its_resources_in_slot_order_with_the_access_the_glsl_declares()
     let (sources, kinds, layers, read_image) = (buffer("sources"), buffer("type"), image("layers"), image("read"));
     let (mut targets, mut counters, mut halves) = (buffer("targets"), buffer("counters"), buffer("halves"));
     let (mut written, mut counted) = (image("written"), image("counted"));
+    let world = Structure::over_instances("world", 1, Lifetime::Scene);
     let bind = access::Bind {
         sources: &sources,
         targets: &mut targets,
@@ -49,6 +51,7 @@ fn a_bind_visits_its_resources_in_slot_order_with_the_access_the_glsl_declares()
         written_image: &mut written,
         counted_image: &mut counted,
         layers: &layers,
+        world: &world,
     };
     let expected = [
         ("layers", 3, Sampled),
@@ -60,6 +63,7 @@ fn a_bind_visits_its_resources_in_slot_order_with_the_access_the_glsl_declares()
         ("sources", 9, StorageRead),
         ("halves", 10, StorageReadWrite),
         ("type", 11, StorageRead),
+        ("world", 12, Traverse),
     ];
     let expected = expected.map(|(name, slot, access)| (name.to_owned(), Slot::Binding(slot), access, Stages::COMPUTE));
     assert_eq!(visited(&bind), expected);
@@ -81,6 +85,7 @@ fn samplers_are_bindings_of_the_shader_and_not_fields_of_bind() {
         (9, BindingKind::StorageBuffer),
         (10, BindingKind::StorageBuffer),
         (11, BindingKind::StorageBuffer),
+        (12, BindingKind::AccelerationStructure),
     ];
     assert_eq!(kinds, expected);
 }

@@ -64,7 +64,7 @@ impl DeviceFound {
             api: info.api_version.to_string(),
             memory_bytes: info.limits.device_memory_bytes,
             measures_time: info.limits.timestamp_valid_bits > 0,
-            ray_query: info.ray_query,
+            ray_query: info.offers_ray_query(),
             unusable: info.unusable.clone(),
         }
     }

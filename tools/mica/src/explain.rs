@@ -7,8 +7,9 @@ use crate::progress::Progress;
 use crate::report::{DeviceReport, LeftOutReport};
 use crate::session::Session;
 use crate::table::{self, Column};
-use mica_graph::{Access, Pass, Plan, Step};
+use mica_graph::{Access, Pass, Plan, ResourceId, Step};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Prints the plan of the first frame, which builds all tables, and what remains of it in later ones.
 pub fn explain(args: &ExplainArgs) -> Result<(), Failure> {
@@ -21,7 +22,10 @@ pub fn explain(args: &ExplainArgs) -> Result<(), Failure> {
     let later = session.declare(None)?;
     let later = session.executor.plan(later.graph)?;
 
-    let passes = plan.passes.iter().zip(is_update).map(|(pass, is_update)| PassReport::new(pass, is_update)).collect();
+    let bytes: BTreeMap<ResourceId, u64> =
+        plan.resources.iter().map(|usage| (usage.resource.id, usage.bytes)).collect();
+    let passes = plan.passes.iter().zip(is_update);
+    let passes = passes.map(|(pass, is_update)| PassReport::new(pass, is_update, &bytes)).collect();
     let report = ExplainReport {
         schema: "mica-explain-1",
         scene: session.scene.clone(),
@@ -91,12 +95,13 @@ struct PassReport {
 }
 
 impl PassReport {
-    fn new(pass: &Pass, once: bool) -> Self {
+    fn new(pass: &Pass, once: bool, bytes: &BTreeMap<ResourceId, u64>) -> Self {
         let uses = |wanted: fn(Access) -> bool| {
             let mut uses: Vec<UseReport> = Vec::new();
             for used in pass.uses.iter().filter(|used| wanted(used.access)) {
                 if !uses.iter().any(|known| known.resource == used.resource.name) {
-                    uses.push(UseReport { resource: used.resource.name.clone(), bytes: used.resource.bytes() });
+                    let bytes = bytes.get(&used.resource.id).copied().unwrap_or_default();
+                    uses.push(UseReport { resource: used.resource.name.clone(), bytes });
                 }
             }
             uses
@@ -143,7 +148,7 @@ fn resources(plan: &Plan) -> Vec<ResourceReport> {
         .iter()
         .map(|usage| ResourceReport {
             name: usage.resource.name.clone(),
-            bytes: usage.placement.map_or_else(|| usage.resource.bytes(), |placement| placement.bytes),
+            bytes: usage.placement.map_or(usage.bytes, |placement| placement.bytes),
             lifetime: usage.resource.lifetime.name(),
             passes: [usage.passes.0, usage.passes.1],
             offset: usage.placement.map(|placement| placement.offset),

@@ -4,11 +4,12 @@ use super::{Garbage, Resources};
 use crate::device::Device;
 use crate::error::Error;
 use crate::memory::{self, Object};
+use crate::structures;
 use crate::vulkan_types as to_vk;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;
-use mica_graph::{Access, Description, Placement, Usage};
+use mica_graph::{Access, BufferDesc, Description, Placement, Usage};
 use std::collections::BTreeSet;
 
 /// The memory of the frames' own resources, and the objects that the last plan placed in it.
@@ -127,16 +128,20 @@ impl Resources {
 
 fn create_placed(device: &Device, usage: &Usage, allocation: &Allocation, offset: u64) -> Result<Object, Error> {
     let what = &usage.resource.name;
+    let buffer = |desc: BufferDesc| {
+        let object = memory::create_buffer(device, what, desc)?;
+        let bound = memory::bind_buffer(device, what, object.buffer, allocation, offset);
+        bound.inspect_err(|_| {
+            // SAFETY: nothing has used the buffer.
+            unsafe { device.raw.destroy_buffer(object.buffer, None) }
+        })?;
+        Ok(Object::Buffer(object))
+    };
     match &usage.resource.description {
-        Description::Buffer(desc) => {
-            let object = memory::create_buffer(device, what, *desc)?;
-            let bound = memory::bind_buffer(device, what, object.buffer, allocation, offset);
-            bound.inspect_err(|_| {
-                // SAFETY: nothing has used the buffer.
-                unsafe { device.raw.destroy_buffer(object.buffer, None) }
-            })?;
-            Ok(Object::Buffer(object))
-        }
+        Description::Buffer(desc) => buffer(*desc),
+        Description::Scratch(desc) => buffer(BufferDesc { bytes: structures::sizes(device, what, desc)?.scratch }),
+        // Refused when its requirements were asked for.
+        Description::Structure(_) => Err(Error::Unbound { resource: what.clone() }),
         Description::Image(desc) => {
             let flags = to_vk::image_usage(&usage.accesses);
             let image = memory::create_image(device, what, desc, flags)?;

@@ -15,11 +15,18 @@ pub struct Host {
     pool: vk::CommandPool,
     messages: Box<Mutex<Vec<String>>>,
     messenger: (ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT),
+    enabled: Vec<Feature>,
     _entry: Entry,
 }
 
 impl Host {
+    /// With all that Mica needs, and nothing else.
     pub fn new() -> Self {
+        Self::enabling(&[])
+    }
+
+    /// With some features beside, which the device has.
+    pub fn enabling(optional: &[Feature]) -> Self {
         let messages: Box<Mutex<Vec<String>>> = Box::default();
         let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
             .message_severity(
@@ -61,20 +68,33 @@ impl Host {
         let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&[1.0])];
         let mut core = vk::PhysicalDeviceFeatures::default();
         let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
-        for needed in requirements.features {
-            match needed.feature {
+        let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default();
+        let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
+        let mut queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
+        let needed = requirements.features.iter().map(|needed| needed.feature);
+        let enabled: Vec<Feature> = needed.chain(optional.iter().copied()).collect();
+        for feature in &enabled {
+            match feature {
                 Feature::Synchronization2 => vulkan13.synchronization2 = vk::TRUE,
                 Feature::DynamicRendering => vulkan13.dynamic_rendering = vk::TRUE,
                 Feature::Maintenance4 => vulkan13.maintenance4 = vk::TRUE,
                 Feature::StorageImageExtendedFormats => core.shader_storage_image_extended_formats = vk::TRUE,
                 Feature::Int64 => core.shader_int64 = vk::TRUE,
                 Feature::Float64 => core.shader_float64 = vk::TRUE,
+                Feature::BufferDeviceAddress => addresses.buffer_device_address = vk::TRUE,
+                Feature::AccelerationStructure => structures.acceleration_structure = vk::TRUE,
+                Feature::RayQuery => queries.ray_query = vk::TRUE,
             }
         }
-        let create = vk::DeviceCreateInfo::default()
+        let extensions: Vec<_> = enabled.iter().flat_map(|it| it.extensions()).map(|name| name.as_ptr()).collect();
+        let mut create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
+            .enabled_extension_names(&extensions)
             .enabled_features(&core)
             .push_next(&mut vulkan13);
+        if enabled.contains(&Feature::RayQuery) {
+            create = create.push_next(&mut addresses).push_next(&mut structures).push_next(&mut queries);
+        }
         let pool = vk::CommandPoolCreateInfo::default().queue_family_index(queue_family);
         // SAFETY: the device was found usable, so it has every feature that is asked for.
         let (device, queue, pool) = unsafe {
@@ -83,7 +103,7 @@ impl Host {
             let pool = device.create_command_pool(&pool, None).expect("a pool");
             (device, queue, pool)
         };
-        Self { instance, physical, device, queue_family, queue, pool, messages, messenger, _entry: entry }
+        Self { instance, physical, device, queue_family, queue, pool, messages, messenger, enabled, _entry: entry }
     }
 
     /// Lends the device with everything enabled.
@@ -93,9 +113,8 @@ impl Host {
 
     /// Lends the device behind other functions.
     pub fn lend_table(&self, device: &Device) -> Arc<MicaDevice> {
-        let enabled: Vec<Feature> = MicaDevice::requirements().features.iter().map(|needed| needed.feature).collect();
         // SAFETY: the handles belong together, the features are enabled, and tests drop the host last.
-        unsafe { MicaDevice::borrow(self.description(device, &enabled)) }.expect("the host's device serves")
+        unsafe { MicaDevice::borrow(self.description(device, &self.enabled)) }.expect("the host's device serves")
     }
 
     /// What is lent, for tests that lend less.

@@ -3,7 +3,7 @@
 
 pub mod host;
 
-use mica_gpu::{Device, DeviceOptions, Executor, ExecutorOptions, Messages};
+use mica_gpu::{Device, DeviceOptions, Executor, ExecutorOptions, Feature, Messages};
 use mica_graph::{Access, Binding, BindingKind, Resource, Shader, Slot, Stage, StageCode, Stages, Use};
 use std::io::Write;
 use std::process::{Command, Stdio};
@@ -25,6 +25,16 @@ impl Checked {
 
     pub fn device(&self) -> Arc<Device> {
         self.device.clone().expect("the device lives as long as this")
+    }
+
+    /// The device, if it offers ray queries. Where the environment says that it has to (`MICA_EXPECT=ray-query`), one
+    /// without fails the test.
+    pub fn with_ray_query(&self) -> Option<Arc<Device>> {
+        let device = self.device();
+        let lacks = &device.info().ray_query_lacks;
+        let expected = std::env::var("MICA_EXPECT").is_ok_and(|expected| expected == "ray-query");
+        assert!(!expected || lacks.is_empty(), "ray queries are expected here: {} lacks {lacks:?}", device.info().name);
+        Some(device).filter(|device| device.has(Feature::RayQuery))
     }
 
     pub fn executor(&self) -> Executor {

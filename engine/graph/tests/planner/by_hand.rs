@@ -3,8 +3,8 @@
 use crate::frames::requirements;
 use crate::shaders::{COMPUTE, Compute, Raster};
 use mica_graph::{
-    Access, Barrier, Buffer, Extent, Format, Graph, Image, ImageDesc, Lifetime, Plan, Requirements, Slot, Stages, Step,
-    Use, Work,
+    Access, Barrier, Buffer, Extent, Format, Graph, Image, ImageDesc, Lifetime, MeshRange, Plan, Requirements, Slot,
+    Stages, Step, Structure, TrianglesDesc, Use, Work,
 };
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -260,25 +260,58 @@ fn indirect_arguments_are_waited_for_where_they_are_fetched() {
 }
 
 #[test]
-fn a_build_waits_for_its_inputs_and_the_next_for_its_scratch() {
+fn a_build_waits_for_its_inputs_and_what_is_built_on_it_for_the_build() {
     let mut g = Graph::new();
-    let mut vertices = Buffer::new("vertices", 36, Lifetime::Scene);
-    let mut first = Buffer::new("first", 64, Lifetime::Scene);
-    let mut second = Buffer::new("second", 64, Lifetime::Scene);
-    let mut scratch = g.buffer("scratch", 64);
-    g.upload(&mut vertices, vec![0; 36]);
-    g.build("build first", &[&vertices], &mut first, &mut scratch);
-    g.build("build second", &[&vertices, &vertices], &mut second, &mut scratch);
+    let mut positions = Buffer::new("positions", 36, Lifetime::Scene);
+    let mut indices = Buffer::new("indices", 12, Lifetime::Scene);
+    let triangle = TrianglesDesc { triangles: 1, vertices: 3, opaque: true };
+    let mut mesh = Structure::over_triangles("mesh", triangle, Lifetime::Scene);
+    let mut small = Structure::compacted(&mesh).expect("a bottom level");
+    let mut world = Structure::over_instances("world", 2, Lifetime::Scene);
+    g.upload(&mut positions, vec![0; 36]);
+    g.upload(&mut indices, vec![0; 12]);
+    let range = MeshRange { first_index: 0, first_vertex: 0 };
+    g.build_meshes("build meshes", &indices, &positions, [(&mut mesh, range)]);
+    g.compact(&mesh, &mut small);
+    g.build_instances("build instances", [(&small, [[0.0; 4]; 3], 0), (&small, [[0.0; 4]; 3], 1)], &mut world);
     let plan = plan(g);
-    let why: Vec<(&str, &[String])> = barriers(&plan).iter().map(|(pass, it)| (*pass, it.why.as_slice())).collect();
+    let why: Vec<(&str, Vec<&str>)> =
+        barriers(&plan).iter().map(|(pass, it)| (*pass, it.why.iter().map(String::as_str).collect())).collect();
     let expected = [
-        ("build first", "vertices: upload vertices writes, build first reads"),
-        ("build second", "scratch: build first writes, build second writes"),
+        (
+            "build meshes",
+            vec![
+                "indices: upload indices writes, build meshes reads",
+                "positions: upload positions writes, build meshes reads",
+            ],
+        ),
+        ("compact mesh", vec!["mesh: build meshes writes, compact mesh reads"]),
+        (
+            "build instances",
+            vec![
+                "mesh: compact mesh writes, build instances reads",
+                "scratch of world in the bytes of scratch of mesh: build meshes writes, build instances writes",
+            ],
+        ),
     ];
-    assert_eq!(
-        why,
-        expected.map(|(pass, why)| (pass, vec![why.to_owned()])).each_ref().map(|(pass, why)| (*pass, why.as_slice()))
-    );
+    assert_eq!(why, expected);
+}
+
+#[test]
+fn two_builds_in_a_frame_share_their_scratch_one_after_the_other() {
+    let mut g = Graph::new();
+    let buffer = |name: &str| Buffer::new(name, 36, Lifetime::Scene);
+    let (positions, indices) = (buffer("positions"), buffer("indices"));
+    let triangle = TrianglesDesc { triangles: 1, vertices: 3, opaque: true };
+    let mut meshes = ["first", "second"].map(|name| Structure::over_triangles(name, triangle, Lifetime::Scene));
+    for mesh in &mut meshes {
+        let range = MeshRange { first_index: 0, first_vertex: 0 };
+        g.build_meshes("build", &indices, &positions, [(mesh, range)]);
+    }
+    let plan = plan(g);
+    assert!(plan.shared_bytes < plan.unshared_bytes, "{plan}");
+    let (_, barrier) = barriers(&plan)[0];
+    assert_eq!(barrier.why, ["scratch of second in the bytes of scratch of first: build writes"]);
 }
 
 #[test]

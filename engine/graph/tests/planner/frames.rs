@@ -181,6 +181,14 @@ impl Writer {
     }
 
     fn transfer_to(&mut self, frame: &Frame, uses: &mut Uses, random: &mut Random) -> (&'static str, Work) {
+        if random.percent(25) {
+            // A part keeps the rest, so there has to be one.
+            let buffers = self.readable(frame, |it| !is_image(it));
+            if let Some(to) = random.choose(&buffers) {
+                uses.add(to, Slot::None, Access::TransferUpdate, Stages::TRANSFER);
+            }
+            return ("update", Work::Update { data: vec![0; 4].into(), offset: 0 });
+        }
         let Some(to) = self.target(frame, random, |_| true) else { return ("fill", Work::Fill { word: 0 }) };
         uses.add(to, Slot::None, Access::TransferWrite, Stages::TRANSFER);
         if random.percent(50) {
@@ -213,7 +221,7 @@ impl Writer {
                 uses.add(to, Slot::None, Access::BuildWrite, Stages::BUILD);
             }
         }
-        ("build", Work::Build)
+        ("build", Work::Compact)
     }
 
     fn download(&mut self, frame: &Frame, uses: &mut Uses, random: &mut Random) -> (&'static str, Work) {
@@ -288,7 +296,7 @@ fn is_image(resource: &Resource) -> bool {
 fn extent_of(resource: &Resource) -> Option<Extent> {
     match resource.description {
         Description::Image(image) => Some(image.extent),
-        Description::Buffer(_) => None,
+        _ => None,
     }
 }
 

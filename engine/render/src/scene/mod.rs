@@ -2,6 +2,7 @@
 
 mod atlas;
 pub mod bvh;
+mod centre;
 mod environment;
 mod environment_file;
 mod error;
@@ -54,7 +55,8 @@ pub struct Scene {
 impl Scene {
     /// Loads a `.gltf` or `.glb` file and what it refers to, within [`LoadLimits::default`].
     ///
-    /// What is wrong beyond repair is an error; what was repaired or left out is in [`Scene::warnings`].
+    /// What is wrong beyond repair is an error; what was repaired or left out is in [`Scene::warnings`]. Meshes are near
+    /// their own origin: see [`Scene::centre_far_meshes`].
     pub fn load(path: &Path) -> Result<Scene, SceneError> {
         Self::load_within(path, &LoadLimits::default())
     }

@@ -20,7 +20,8 @@ pub struct Ray {
     pub t_max: f32,
     /// Unless 0, the shader first moves the origin off the surface along it.
     pub normal: [f32; 3],
-    pub unused: u32,
+    /// The power of two that the scene fits into.
+    pub scene_unit: f32,
 }
 
 impl Ray {
@@ -31,7 +32,7 @@ impl Ray {
             direction: direction.as_vec3().to_array(),
             t_max: 1e30,
             normal: [0.0; 3],
-            unused: 0,
+            scene_unit: 1.0,
         }
     }
 }

@@ -12,7 +12,7 @@ struct Ray {
   vec3 direction;
   float t_max;
   vec3 normal; // Unless 0, the origin is moved off the surface along it.
-  uint unused;
+  float scene_unit; // As in Frame.
 };
 
 struct Answer {
@@ -34,7 +34,7 @@ void main() {
     return;
   }
   Ray ray = rays[index];
-  vec3 origin = ray.normal == vec3(0.0) ? ray.origin : offset_origin(ray.origin, ray.normal);
+  vec3 origin = ray.normal == vec3(0.0) ? ray.origin : offset_origin(ray.origin, ray.normal, ray.scene_unit);
   RayHit hit;
   bool closest = closest_hit(origin, ray.direction, ray.t_min, ray.t_max, hit);
   bool any = occluded(origin, ray.direction, ray.t_min, ray.t_max);

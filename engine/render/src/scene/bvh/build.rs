@@ -6,15 +6,24 @@
 use super::{Bounds, leaf, moved, node_over, renamed};
 use mica_shaders::constants::BVH_NOTHING;
 use mica_shaders::types::BvhNode;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 /// Candidate planes an axis, plus one.
 const BINS: usize = 16;
 
+/// Few primitives have no use for that many, and most nodes are over few.
+const BINS_A_PRIMITIVE: usize = 2;
+
 /// A visit of a node in tests of a triangle. On lavapipe 0.3, 1 and 2 are within 10 % of each other, and 1 is the fastest.
 const VISIT_COST: f64 = 1.0;
 
-/// Ranges longer than this are built by two threads.
+/// Ranges longer than this are built by two threads, and those up to it are reported as done.
 const PARALLEL_PRIMITIVES: usize = 4096;
+
+/// Longer lists are gone through in parts of this length by several threads: whatever their number, the parts are the
+/// same, and so is the sum over them.
+const PART: usize = 32 * 1024;
 
 /// One box to be enclosed.
 #[derive(Clone, Copy, Debug)]
@@ -39,75 +48,148 @@ pub(super) struct Tree {
     pub nodes: Vec<BvhNode>,
     pub root: u32,
     pub bounds: Bounds,
+    /// The most primitives, more than a leaf takes, that no plane separates because their centres are the same.
+    pub most_in_one_place: usize,
+}
+
+/// What all parts of a build share.
+struct Build<'a> {
+    leaf: usize,
+    placed: Option<&'a AtomicU64>,
+    most_in_one_place: AtomicUsize,
 }
 
 /// Builds over `primitives` and puts them in the order of the leaves. There may be any number that fits
-/// `limits.leaf << limits.levels`.
-pub(super) fn build(primitives: &mut [Primitive], limits: Limits) -> Tree {
+/// `limits.leaf << limits.levels`. Their number is added to `placed` as they find their places.
+pub(super) fn build(primitives: &mut [Primitive], limits: Limits, placed: Option<&AtomicU64>) -> Tree {
     let mut nodes = Vec::with_capacity(primitives.len() / 2);
+    debug_assert!(primitives.len() <= limits.leaf << limits.levels);
     if primitives.is_empty() {
-        return Tree { nodes, root: BVH_NOTHING, bounds: Bounds::EMPTY };
+        return Tree { nodes, root: BVH_NOTHING, bounds: Bounds::EMPTY, most_in_one_place: 0 };
     }
-    let (root, bounds) = subtree(primitives, 0, limits, &mut nodes);
-    Tree { nodes, root, bounds }
+    let build = Build { leaf: limits.leaf, placed, most_in_one_place: AtomicUsize::new(0) };
+    let (root, bounds) = build.reported(primitives, 0, limits.levels, &mut nodes);
+    Tree { nodes, root, bounds, most_in_one_place: build.most_in_one_place.into_inner() }
 }
 
-/// Appends the nodes over `primitives`, which start at position `first` of all; returns the reference and the box.
-fn subtree(primitives: &mut [Primitive], first: u32, limits: Limits, nodes: &mut Vec<BvhNode>) -> (u32, Bounds) {
-    let bounds = bounds_of(primitives);
-    let Some(middle) = split(primitives, &bounds, limits) else {
-        return (leaf(first, primitives.len() as u32), bounds);
-    };
-    let parallel = primitives.len() > PARALLEL_PRIMITIVES;
-    let (left, right) = primitives.split_at_mut(middle);
-    let below = Limits { levels: limits.levels - 1, ..limits };
-    let right_first = first + middle as u32;
-
-    let node = nodes.len();
-    nodes.push(BvhNode::default());
-    let children = if parallel {
-        let mut right_nodes = Vec::new();
-        let (left, (right, right_bounds)) =
-            rayon::join(|| subtree(left, first, below, nodes), || subtree(right, right_first, below, &mut right_nodes));
-        let base = nodes.len() as u32;
-        nodes.extend(right_nodes.iter().map(|node| renamed(node, |reference| moved(reference, base, 0))));
-        [left, (moved(right, base, 0), right_bounds)]
-    } else {
-        [subtree(left, first, below, nodes), subtree(right, right_first, below, nodes)]
-    };
-    nodes[node] = node_over(children);
-    (node as u32, bounds)
-}
-
-/// Reorders `primitives` so that they split at the returned position; `None` where they should be a leaf.
-fn split(primitives: &mut [Primitive], bounds: &Bounds, limits: Limits) -> Option<usize> {
-    let count = primitives.len();
-    if count == 1 {
-        return None;
+impl Build<'_> {
+    /// A subtree; one that a single thread builds is reported once it is whole, seldom enough not to be felt.
+    fn reported(
+        &self,
+        primitives: &mut [Primitive],
+        first: u32,
+        levels: u32,
+        nodes: &mut Vec<BvhNode>,
+    ) -> (u32, Bounds) {
+        let made = self.subtree(primitives, first, levels, nodes);
+        if let Some(placed) = self.placed.filter(|_| primitives.len() <= PARALLEL_PRIMITIVES) {
+            placed.fetch_add(primitives.len() as u64, Ordering::Relaxed);
+        }
+        made
     }
-    let centres = primitives
-        .iter()
-        .fold(Bounds::EMPTY, |bounds, primitive| bounds.union(Bounds::of_point(primitive.bounds.doubled_centre())));
-    let best = best_plane(primitives, &centres);
-    if count <= limits.leaf {
-        let leaf_cost = bounds.half_area() * count as f64;
-        let cheaper = |plane: &Plane| plane.cost + VISIT_COST * bounds.half_area() < leaf_cost;
-        if limits.levels == 0 || !best.as_ref().is_some_and(cheaper) {
+
+    /// Appends the nodes over `primitives`, which start at position `first` of all and may take so many `levels`; returns
+    /// the reference and the box.
+    fn subtree(
+        &self,
+        primitives: &mut [Primitive],
+        first: u32,
+        levels: u32,
+        nodes: &mut Vec<BvhNode>,
+    ) -> (u32, Bounds) {
+        let count = primitives.len();
+        let extent = Extent::of(primitives);
+        let parallel = count > PARALLEL_PRIMITIVES;
+        let reference = match self.split(primitives, &extent, levels) {
+            None => leaf(first, count as u32),
+            Some(middle) => {
+                let (left, right) = primitives.split_at_mut(middle);
+                let right_first = first + middle as u32;
+                let levels = levels - 1;
+                let node = nodes.len();
+                nodes.push(BvhNode::default());
+                let children = if parallel {
+                    let mut right_nodes = Vec::with_capacity(right.len() / 2);
+                    let (left, (right, right_bounds)) = rayon::join(
+                        || self.reported(left, first, levels, nodes),
+                        || self.reported(right, right_first, levels, &mut right_nodes),
+                    );
+                    let base = nodes.len() as u32;
+                    nodes.extend(right_nodes.iter().map(|node| renamed(node, |reference| moved(reference, base, 0))));
+                    [left, (moved(right, base, 0), right_bounds)]
+                } else {
+                    [self.subtree(left, first, levels, nodes), self.subtree(right, right_first, levels, nodes)]
+                };
+                nodes[node] = node_over(children);
+                node as u32
+            }
+        };
+        (reference, extent.bounds)
+    }
+
+    /// Reorders `primitives` so that they split at the returned position; `None` where they should be a leaf.
+    fn split(&self, primitives: &mut [Primitive], extent: &Extent, levels: u32) -> Option<usize> {
+        let count = primitives.len();
+        if count == 1 {
             return None;
         }
+        let best = best_plane(primitives, &extent.doubled_centres);
+        if count <= self.leaf {
+            let area = extent.bounds.half_area();
+            let cheaper = |plane: &Plane| plane.cost + VISIT_COST * area < area * count as f64;
+            if levels == 0 || !best.as_ref().is_some_and(cheaper) {
+                return None;
+            }
+        } else if best.is_none() {
+            self.most_in_one_place.fetch_max(count, Ordering::Relaxed);
+        }
+        let affordable = |part: usize| levels_needed(part, self.leaf) < levels;
+        if let Some(plane) = best.filter(|plane| affordable(plane.left) && affordable(count - plane.left)) {
+            return Some(partition(primitives, |primitive| plane.bin.of(primitive) < plane.first_right));
+        }
+        let Bounds { lower, upper } = extent.doubled_centres;
+        let width = |axis: usize| upper[axis] - lower[axis];
+        let axis = (0..3).fold(0, |widest, axis| if width(axis) > width(widest) { axis } else { widest });
+        let middle = count / 2;
+        primitives.select_nth_unstable_by(middle, |a, b| {
+            let [a_centre, b_centre] = [a, b].map(|primitive| primitive.bounds.doubled_centre()[axis]);
+            a_centre.total_cmp(&b_centre).then(a.index.cmp(&b.index))
+        });
+        Some(middle)
     }
-    let affordable = |part: usize| levels_needed(part, limits.leaf) < limits.levels;
-    if let Some(plane) = best.filter(|plane| affordable(plane.left) && affordable(count - plane.left)) {
-        return Some(partition(primitives, |primitive| plane.bin.of(primitive) < plane.first_right));
+}
+
+/// Where primitives are.
+#[derive(Clone, Copy)]
+struct Extent {
+    bounds: Bounds,
+    doubled_centres: Bounds,
+}
+
+impl Extent {
+    fn of(primitives: &[Primitive]) -> Self {
+        let nothing = Self { bounds: Bounds::EMPTY, doubled_centres: Bounds::EMPTY };
+        let union = |a: Self, b: Self| Self {
+            bounds: a.bounds.union(b.bounds),
+            doubled_centres: a.doubled_centres.union(b.doubled_centres),
+        };
+        let of_one = |primitive: &Primitive| Self {
+            bounds: primitive.bounds,
+            doubled_centres: Bounds::of_point(primitive.bounds.doubled_centre()),
+        };
+        summed(primitives, |part| part.iter().map(of_one).fold(nothing, union), union)
     }
-    let extent: [f32; 3] = std::array::from_fn(|axis| centres.upper[axis] - centres.lower[axis]);
-    let axis = (0..3).fold(0, |widest, axis| if extent[axis] > extent[widest] { axis } else { widest });
-    let middle = count / 2;
-    primitives.select_nth_unstable_by(middle, |a, b| {
-        let [a_centre, b_centre] = [a, b].map(|primitive| primitive.bounds.doubled_centre()[axis]);
-        a_centre.total_cmp(&b_centre).then(a.index.cmp(&b.index))
-    });
-    Some(middle)
+}
+
+/// A sum over parts of `primitives`, taken by several threads where they are many. The parts and the order in which they
+/// are added do not depend on the number of threads.
+fn summed<T: Send>(primitives: &[Primitive], of_part: impl Fn(&[Primitive]) -> T + Sync, add: impl Fn(T, T) -> T) -> T {
+    if primitives.len() <= PART {
+        return of_part(primitives);
+    }
+    let (first, rest) = primitives.split_at(PART);
+    let (first, rest): (T, Vec<T>) = rayon::join(|| of_part(first), || rest.par_chunks(PART).map(&of_part).collect());
+    rest.into_iter().fold(first, add)
 }
 
 /// The levels that halving alone needs for `count` primitives.
@@ -121,6 +203,7 @@ struct Bin {
     axis: usize,
     origin: f32,
     bins_per_unit: f32,
+    used: usize,
 }
 
 impl Bin {
@@ -128,7 +211,7 @@ impl Bin {
         let bounds = &primitive.bounds;
         let centre = bounds.lower[self.axis] + bounds.upper[self.axis];
         // An extent so small that its inverse is infinite gives NaN here, which the conversion makes bin 0.
-        (((centre - self.origin) * self.bins_per_unit) as usize).min(BINS - 1)
+        (((centre - self.origin) * self.bins_per_unit) as usize).min(self.used - 1)
     }
 }
 
@@ -151,32 +234,30 @@ impl Plane {
     }
 }
 
+/// What falls into each bin of an axis: the box around it, and its number.
+type Bins = [(Bounds, usize); BINS];
+
 /// The cheapest plane of all axes; `None` where no plane separates the centres, as where all are the same.
 fn best_plane(primitives: &[Primitive], doubled_centres: &Bounds) -> Option<Plane> {
     let count = primitives.len();
-    let mut best: Option<Plane> = None;
-    for axis in 0..3 {
+    let used = (BINS_A_PRIMITIVE * count).min(BINS);
+    let axes: [Option<Bin>; 3] = std::array::from_fn(|axis| {
         let origin = doubled_centres.lower[axis];
         let extent = doubled_centres.upper[axis] - origin;
-        if extent <= 0.0 {
-            continue;
-        }
-        let bin = Bin { axis, origin, bins_per_unit: BINS as f32 / extent };
-        let mut bins = [(Bounds::EMPTY, 0usize); BINS];
-        for primitive in primitives {
-            let (bounds, inside) = &mut bins[bin.of(primitive)];
-            *bounds = bounds.union(primitive.bounds);
-            *inside += 1;
-        }
+        (extent > 0.0).then(|| Bin { axis, origin, bins_per_unit: used as f32 / extent, used })
+    });
+    let mut best: Option<Plane> = None;
+    for bin in axes.into_iter().flatten() {
+        let bins = binned(primitives, bin);
         let mut right_costs = [0.0; BINS];
         let (mut right, mut right_count) = (Bounds::EMPTY, 0);
-        for first_right in (1..BINS).rev() {
+        for first_right in (1..used).rev() {
             right = right.union(bins[first_right].0);
             right_count += bins[first_right].1;
             right_costs[first_right] = right.half_area() * right_count as f64;
         }
         let (mut left_bounds, mut left) = (Bounds::EMPTY, 0);
-        for first_right in 1..BINS {
+        for first_right in 1..used {
             left_bounds = left_bounds.union(bins[first_right - 1].0);
             left += bins[first_right - 1].1;
             let cost = left_bounds.half_area() * left as f64 + right_costs[first_right];
@@ -189,6 +270,21 @@ fn best_plane(primitives: &[Primitive], doubled_centres: &Bounds) -> Option<Plan
     best
 }
 
+/// The primitives in bins of an axis.
+fn binned(primitives: &[Primitive], bin: Bin) -> Bins {
+    let of_part = |part: &[Primitive]| {
+        let mut bins = [(Bounds::EMPTY, 0); BINS];
+        for primitive in part {
+            let (bounds, inside) = &mut bins[bin.of(primitive)];
+            *bounds = bounds.union(primitive.bounds);
+            *inside += 1;
+        }
+        bins
+    };
+    let add = |a: Bins, b: Bins| std::array::from_fn(|bin| (a[bin].0.union(b[bin].0), a[bin].1 + b[bin].1));
+    summed(primitives, of_part, add)
+}
+
 /// Moves the primitives that `belongs_left` to the front; returns how many they are.
 fn partition(primitives: &mut [Primitive], belongs_left: impl Fn(&Primitive) -> bool) -> usize {
     let mut left = 0;
@@ -199,8 +295,4 @@ fn partition(primitives: &mut [Primitive], belongs_left: impl Fn(&Primitive) -> 
         }
     }
     left
-}
-
-fn bounds_of(primitives: &[Primitive]) -> Bounds {
-    primitives.iter().fold(Bounds::EMPTY, |bounds, primitive| bounds.union(primitive.bounds))
 }

@@ -9,12 +9,15 @@
 
 mod build;
 mod mesh;
+mod placements;
 mod scene;
 
-pub use mesh::MeshBvh;
+pub use mesh::{MeshBvh, check};
 use mica_shaders::constants::{BVH_FIRST_BITS, BVH_LEAF, BVH_NOTHING};
 use mica_shaders::types::BvhNode;
-pub use scene::SceneBvh;
+pub use placements::{Placed, Placements};
+pub use scene::{SceneBvh, SceneTop, TopLevel};
+use std::sync::atomic::AtomicU64;
 
 /// Triangles in a leaf, at most: 4 and 2 are equally fast on lavapipe, and 4 takes fewer nodes.
 pub const LEAF_TRIANGLES: usize = 4;
@@ -24,6 +27,17 @@ pub const LARGEST_COORDINATE: f32 = 1e12;
 
 /// The first triangle of all that a reference cannot name.
 const END_OF_TRIANGLES: usize = (1 << BVH_FIRST_BITS) - 1;
+
+/// What a build over a mesh is told beside its triangles.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BuildOptions<'a> {
+    /// Whether an alpha mask cuts holes into its triangles: two in the same place then differ unless they have the same
+    /// vertices.
+    pub masked: bool,
+    /// Raised by the number of triangles that have found their place, by and by, to all of them: another thread may read
+    /// how far the build has come.
+    pub placed: Option<&'a AtomicU64>,
+}
 
 /// What no hierarchy can be built over.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -105,6 +119,18 @@ impl Bounds {
         Self {
             lower: std::array::from_fn(|axis| self.lower[axis].min(other.lower[axis])),
             upper: std::array::from_fn(|axis| self.upper[axis].max(other.upper[axis])),
+        }
+    }
+
+    fn longest_side(&self) -> f32 {
+        (0..3).fold(0.0, |longest, axis| (self.upper[axis] - self.lower[axis]).max(longest))
+    }
+
+    /// The same with so much more room on every side, and never less than an f32 can tell apart.
+    fn widened(self, room: f32) -> Self {
+        Self {
+            lower: self.lower.map(|lower| (lower - room).next_down()),
+            upper: self.upper.map(|upper| (upper + room).next_up()),
         }
     }
 

@@ -90,7 +90,9 @@ fn read(name: String, bytes: &[u8], folder: Option<PathBuf>, limits: &LoadLimits
     for warning in &warnings {
         log::warn!("{}: {warning}", OneLine(&name));
     }
-    Ok(Scene { name, meshes, instances, materials, textures, lights, cameras, warnings, environment })
+    let mut scene = Scene { name, meshes, instances, materials, textures, lights, cameras, warnings, environment };
+    scene.centre_far_meshes();
+    Ok(scene)
 }
 
 /// The bytes of every buffer, as many as it declares; none where the document gives a buffer no data.
