@@ -3,7 +3,7 @@
 use crate::Picture;
 use mica_gpu::{Device, DeviceOptions, Executor, Messages, Timing};
 use mica_graph::{Buffer, Graph};
-use mica_render::{Cache, LeftOut, Renderer, View};
+use mica_render::{Cache, LeftOut, OcclusionBackend, Renderer, View};
 use std::sync::{Arc, LazyLock};
 
 /// A device of our own with validation and synchronisation validation on, and an executor on it. Dropping it fails the
@@ -57,6 +57,17 @@ impl Gpu {
     /// The executor.
     pub fn executor(&mut self) -> &mut Executor {
         self.executor.as_mut().expect("the executor lives until this is dropped")
+    }
+
+    /// Who answers about occlusion on this device: the BVH always, ray queries where it offers them. Where the environment
+    /// says that it has to (`MICA_EXPECT=ray-query`), a device without them fails the test.
+    pub fn occlusion_bodies(&self) -> Vec<OcclusionBackend> {
+        let info = self.device.as_ref().expect("the device lives until this is dropped").info();
+        let expected = std::env::var("MICA_EXPECT").is_ok_and(|expected| expected == "ray-query");
+        let lacks = &info.ray_query_lacks;
+        assert!(!expected || lacks.is_empty(), "ray queries are expected here: {} lacks {lacks:?}", info.name);
+        let ray_query = info.offers_ray_query().then_some(OcclusionBackend::RayQuery);
+        [OcclusionBackend::Bvh].into_iter().chain(ray_query).collect()
     }
 
     /// Makes or loads what takes too long for a frame, once for all tests of this process.

@@ -13,6 +13,7 @@ mod heuristics;
 mod jakob;
 mod jakob_counts;
 mod kemppinen;
+mod occluders;
 mod occlusion;
 mod orientation;
 mod precise;

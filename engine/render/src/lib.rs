@@ -6,7 +6,9 @@
 mod cache;
 mod embedded;
 mod environment_tables;
+mod filled;
 mod methods;
+mod occluders;
 mod passes;
 mod renderer;
 pub mod scene;
@@ -19,7 +21,9 @@ pub use embedded::{EMBEDDED_SCENES, EmbeddedScene, embedded_scene};
 pub use methods::{
     COMMON_SETTINGS, Claim, DEFAULT_METHOD, GlintMaterial, JakobTable, METHODS, MethodInfo, Rung, method,
 };
-pub use renderer::{Environment, Frame, LeftOut, OcclusionBackend, Progress, Renderer, Update};
+pub use occluders::{OcclusionBackend, RaysOfPass};
+pub use passes::trace::Question;
+pub use renderer::{Environment, Frame, LeftOut, Progress, Renderer, Update};
 pub use settings::{Kind, Setting, SettingError, Value, Values};
 pub use view::View;
 
@@ -41,6 +45,37 @@ pub enum RenderError {
         count: usize,
         /// How many there may be.
         limit: usize,
+    },
+    /// An instance that is to be moved does not exist.
+    #[error("there is no instance {index}: the scene has {count}, counted from 0")]
+    NoSuchInstance {
+        /// Which was named.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// An instance cannot be where it is to be moved to.
+    #[error(
+        "instance {index} cannot be moved there: its transform must be finite and keep it within coordinates of 1e12"
+    )]
+    BadPlacement {
+        /// Which one.
+        index: usize,
+    },
+    /// Rays were to be traced without anybody to ask.
+    #[error("rays cannot be traced: occlusion is off; make the renderer with another occlusion backend")]
+    NoOcclusion,
+    /// A buffer of rays or answers is too small.
+    #[error("{count} {what} take {needed} bytes, and their buffer has {bytes}: make it larger")]
+    RaysDoNotFit {
+        /// Rays or answers.
+        what: &'static str,
+        /// How many there are to be.
+        count: u32,
+        /// Size of the buffer.
+        bytes: u64,
+        /// What they take.
+        needed: u64,
     },
     /// The scene cannot be searched for occluders.
     #[error("occlusion: {0}")]

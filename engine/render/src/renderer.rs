@@ -2,34 +2,17 @@
 
 use crate::environment_tables::EnvironmentTables;
 use crate::methods::{self, Finish, Method, Shading};
+use crate::occluders::Occluders;
 use crate::scene::{AlphaMode, Atlas, AtlasLimits, EquirectMap, Light, Material, Scene};
 use crate::scene_buffers::SceneBuffers;
 use crate::settings::{SettingError, Value};
-use crate::{Cache, DEFAULT_METHOD, GlintMaterial, RenderError, View, passes};
+use crate::{Cache, DEFAULT_METHOD, GlintMaterial, OcclusionBackend, Question, RaysOfPass, RenderError, View, passes};
+use glam::{DAffine3, DVec3};
 use mica_gpu::Executor;
 use mica_graph::{Buffer, Extent, Format, Graph, Image, ImageDesc, Lifetime};
 use mica_shaders::{constants as c, types};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// Who answers whether something lies between two points.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OcclusionBackend {
-    /// Nobody: everything is visible.
-    None,
-    /// A hierarchy of bounding volumes, traversed in compute shaders.
-    Bvh,
-}
-
-impl OcclusionBackend {
-    /// The word used in reports.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Bvh => "bvh",
-        }
-    }
-}
 
 /// Light from everywhere.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,6 +40,8 @@ pub struct Frame {
     pub display: Image,
     /// The passes, by index in the graph, that bring tables up to date rather than draw.
     pub updates: std::ops::Range<usize>,
+    /// The passes that trace rays, each with how many; a name may occur more than once.
+    pub rays: Vec<RaysOfPass>,
     /// What the frame does without.
     pub left_out: Vec<LeftOut>,
 }
@@ -82,6 +67,10 @@ pub struct Renderer {
     environment: EnvironmentTables,
     rotation_radians: f64,
     occlusion: OcclusionBackend,
+    /// Present once something asks, unless occlusion is off.
+    occluders: Option<Occluders>,
+    /// Frames declared so far.
+    frames: u64,
     materials: Vec<GlintMaterial>,
     methods: BTreeMap<&'static str, Box<dyn Method>>,
     /// Stands for the shadow mask where there are no lights: shaders bind it but do not read it.
@@ -118,6 +107,8 @@ impl Renderer {
             environment: environment_tables,
             rotation_radians: environment.map_or(0.0, |environment| environment.rotation_radians),
             occlusion,
+            occluders: None,
+            frames: 0,
             materials,
             methods: BTreeMap::new(),
             no_lights: Image::new("no_lights", one, Lifetime::Scene),
@@ -138,6 +129,33 @@ impl Renderer {
     /// Who answers questions about occlusion.
     pub fn occlusion(&self) -> OcclusionBackend {
         self.occlusion
+    }
+
+    /// Where scene space has its origin: it is world space about this point, which stays where it is when instances move.
+    pub fn scene_center(&self) -> DVec3 {
+        self.buffers.center
+    }
+
+    /// Moves an instance. The next frame updates what depends on it, and nothing else.
+    ///
+    /// # Errors
+    /// [`RenderError::NoSuchInstance`] and [`RenderError::BadPlacement`]; nothing is changed then.
+    pub fn place_instance(&mut self, index: usize, world_from_local: DAffine3) -> Result<(), RenderError> {
+        let count = self.scene.instances.len();
+        let Some(instance) = self.scene.instances.get_mut(index) else {
+            return Err(RenderError::NoSuchInstance { index, count });
+        };
+        if !self.buffers.can_be_at(instance.mesh, world_from_local) {
+            return Err(RenderError::BadPlacement { index });
+        }
+        if instance.world_from_local != world_from_local {
+            instance.world_from_local = world_from_local;
+            self.buffers.note_moved(index);
+            if let Some(occluders) = &mut self.occluders {
+                occluders.note_moved(index);
+            }
+        }
+        Ok(())
     }
 
     /// Changes the method of one glinting material, by name, or of all of them. Settings that both methods have are kept.
@@ -198,8 +216,9 @@ impl Renderer {
         }
     }
 
-    /// Makes what takes too long for a frame, or is worth keeping between runs, on a device of our own. A host that only
-    /// records frames does without: frames declare what they need themselves.
+    /// Makes what takes too long for a frame, or is worth keeping between runs, on a device of our own: tables of methods,
+    /// and what blocks rays, if lights or methods ask for it. A host that only records frames does without: frames declare
+    /// what they need themselves.
     pub fn precompute(
         &mut self,
         executor: &mut Executor,
@@ -207,9 +226,17 @@ impl Renderer {
         progress: Progress,
     ) -> Result<Vec<Update>, RenderError> {
         let mut updates = Vec::new();
+        let mut occlusion_asked = self.buffers.light_count > 0;
         for material in self.materials.iter().filter(|material| glints(material)) {
             let method = self.methods.entry(material.method.name).or_insert_with(|| methods::start(material.method));
             updates.extend(method.precompute(material, executor, cache, &mut *progress)?);
+            occlusion_asked |= method.finish(material).mirror_occlusion;
+        }
+        if occlusion_asked && self.occluders.is_none() {
+            let (scene, buffers) = (&self.scene, &mut self.buffers);
+            let (occluders, built) = Occluders::precomputed(self.occlusion, scene, buffers, executor, progress)?;
+            self.occluders = occluders;
+            updates.extend(built);
         }
         Ok(updates)
     }
@@ -243,14 +270,10 @@ impl Renderer {
             method.keep(&of_method.cloned().collect::<Vec<_>>());
         }
         let mirror_occlusion = layers.iter().any(|(finish, _)| finish.mirror_occlusion);
-        let traced = self.occlusion == OcclusionBackend::Bvh;
-        if traced && (lit || mirror_occlusion) {
-            self.buffers.build_bvh(&self.scene)?;
-        }
 
         let first_update = g.passes().len();
-        g.because("first frame of the scene");
-        self.buffers.upload(g);
+        self.update_scene(g, lit || mirror_occlusion)?;
+        self.frames += 1;
         g.because("first frame of the environment");
         self.environment.update(g);
         for material in &glinting {
@@ -266,10 +289,13 @@ impl Renderer {
         let frame = self.upload_frame(g, view);
         let ids = passes::visibility::visibility(g, &self.buffers, &frame, extent);
         let gbuffer = passes::surface::surface(g, &self.buffers, &frame, ids);
-        let shadow_mask = match &self.buffers.bvh {
-            Some(bvh) if lit && traced => {
+        let mut rays = Vec::new();
+        let shadow_mask = match &self.occluders {
+            Some(occluders) if lit => {
                 g.because(format!("{} lights cast shadows", self.buffers.light_count));
-                Some(passes::shadows::shadows(g, &self.buffers, bvh, &frame, &gbuffer))
+                let (mask, counted) = passes::shadows::shadows(g, &self.buffers, occluders, &frame, &gbuffer);
+                rays.push(counted);
+                Some(mask)
             }
             _ => {
                 let why = if lit { "occlusion is off" } else { "no point, directional or spot lights" };
@@ -291,7 +317,7 @@ impl Renderer {
         let mut radiance = base;
         for (finish, materials) in &layers {
             let layer = self.specular_layer(g, materials, &shading, *finish);
-            let visibility = self.mirror_visibility(g, &shading, *finish);
+            let visibility = self.mirror_visibility(g, &shading, *finish, &mut rays);
             g.because("what the flakes reflect is added to the rest");
             radiance = passes::composite::composite(g, &frame, &gbuffer, &radiance, &layer, visibility.as_ref());
         }
@@ -299,7 +325,57 @@ impl Renderer {
         let radiance = self.accumulate(g, &frame, radiance, earlier);
         g.because("every frame");
         let display = passes::tonemap::tonemap(g, &frame, &radiance, view.exposure);
-        Ok(Frame { radiance, display, updates, left_out })
+        Ok(Frame { radiance, display, updates, rays, left_out })
+    }
+
+    /// Declares rays of the caller's own: each of the first `count` in `rays`, [`types::Ray`]s in scene space, gets a
+    /// [`types::RayAnswer`] in `answers`. Returns the [`types::RayCounts`]. What the occluders need is brought up to date
+    /// first, and everything else is as for [`Renderer::frame`].
+    ///
+    /// # Errors
+    /// [`RenderError::NoOcclusion`] without a backend, [`RenderError::RaysDoNotFit`], and those of [`Renderer::frame`];
+    /// nothing is declared then.
+    pub fn trace(
+        &mut self,
+        g: &mut Graph,
+        rays: &Buffer,
+        count: u32,
+        question: Question,
+        answers: &mut Buffer,
+    ) -> Result<Buffer, RenderError> {
+        if self.occlusion == OcclusionBackend::None {
+            return Err(RenderError::NoOcclusion);
+        }
+        passes::trace::check_room(rays, count, answers)?;
+        self.update_scene(g, true)?;
+        // What masks are made of.
+        let glinting: Vec<GlintMaterial> = self.materials.iter().filter(|material| glints(material)).cloned().collect();
+        self.buffers.upload_materials(g, &glinting);
+        let Some(occluders) = &self.occluders else { return Err(RenderError::NoOcclusion) };
+        g.because("rays of the caller's own");
+        let counted = passes::trace::trace(g, &self.buffers, occluders, (rays, count), question, answers);
+        Ok(counted.counts)
+    }
+
+    /// Declares what brings the scene up to date on the device, occluders too if something asks for them.
+    fn update_scene(&mut self, g: &mut Graph, occlusion_asked: bool) -> Result<(), RenderError> {
+        // What can fail comes first: nothing is declared then.
+        let occluders = match &mut self.occluders {
+            _ if !occlusion_asked => None,
+            Some(occluders) => {
+                occluders.follow(&self.scene, &self.buffers)?;
+                Some(occluders)
+            }
+            none => {
+                *none = Occluders::new(self.occlusion, &self.scene, &self.buffers)?;
+                none.as_mut()
+            }
+        };
+        self.buffers.update(g, &self.scene);
+        if let Some(occluders) = occluders {
+            occluders.update(g, &self.scene, &self.buffers, self.frames);
+        }
+        Ok(())
     }
 
     /// What the flakes of each pixel reflect, by the method of its material.
@@ -321,11 +397,18 @@ impl Renderer {
     }
 
     /// How free the mirror direction of each pixel is, if a method asks for it.
-    fn mirror_visibility(&self, g: &mut Graph, shading: &Shading, finish: Finish) -> Option<Image> {
-        let traced = self.occlusion == OcclusionBackend::Bvh && finish.mirror_occlusion;
-        let bvh = self.buffers.bvh.as_ref().filter(|_| traced)?;
+    fn mirror_visibility(
+        &self,
+        g: &mut Graph,
+        shading: &Shading,
+        finish: Finish,
+        rays: &mut Vec<RaysOfPass>,
+    ) -> Option<Image> {
+        let occluders = self.occluders.as_ref().filter(|_| finish.mirror_occlusion)?;
         g.because("the method dims glints whose mirror direction is occluded");
-        let visibility = passes::occlusion::occlusion(g, shading.scene, bvh, shading.frame, shading.gbuffer);
+        let (visibility, counted) =
+            passes::occlusion::occlusion(g, shading.scene, occluders, shading.frame, shading.gbuffer);
+        rays.push(counted);
         Some(match finish.visibility_blur {
             0 => visibility,
             radius => passes::blur::blur_visibility(g, shading.frame, visibility, radius),
@@ -397,10 +480,7 @@ fn unrendered(scene: &Scene) -> Vec<(&'static str, String)> {
             found.push(("clear coat normal map", format!("the coat of material {name} follows the base's normal yet")));
         }
         match alpha {
-            AlphaMode::Opaque => {}
-            AlphaMode::Mask { .. } => {
-                found.push(("holes in shadows", format!("material {name} blocks rays with whole triangles yet")));
-            }
+            AlphaMode::Opaque | AlphaMode::Mask { .. } => {}
             AlphaMode::Blend => {
                 let why = format!("material {name} is shown where its alpha is at least 0.5, and nowhere else, yet");
                 found.push(("alpha blending", why));

@@ -1,54 +1,16 @@
 //! The scene as the shaders read it: buffers and texture atlases, filled once.
 
-use crate::scene::bvh::{MeshBvh, SceneBvh};
-use crate::scene::{AlphaMode, Atlas, AtlasImage, AtlasRecord, Light, Material, Scene, TextureRef, Wrap};
+use crate::filled::{Filled, FilledImage};
+use crate::scene::bvh::LARGEST_COORDINATE;
+use crate::scene::{
+    AlphaMode, Atlas, AtlasImage, AtlasRecord, Bounds, Instance, Light, Material, Mesh, Scene, TextureRef, Wrap,
+};
 use crate::{GlintMaterial, RenderError};
 use glam::{DAffine3, DVec3};
-use mica_graph::{Buffer, Draw, Extent, Format, Graph, Image, ImageDesc, Lifetime};
+use mica_graph::{Buffer, Draw, Extent, Format, Graph, ImageDesc, Lifetime, MeshRange};
 use mica_shaders::{constants as c, types};
+use std::collections::BTreeSet;
 use std::sync::Arc;
-
-/// A buffer that is filled once.
-pub(crate) struct Filled {
-    /// What passes read.
-    pub buffer: Buffer,
-    pending: Option<Arc<[u8]>>,
-}
-
-impl Filled {
-    /// A list as bytes; an empty one is held as 16 zero bytes, as no buffer may be empty.
-    fn new<T: bytemuck::NoUninit>(name: &str, list: &[T]) -> Self {
-        let bytes: &[u8] = bytemuck::cast_slice(list);
-        let bytes: Arc<[u8]> = if bytes.is_empty() { Arc::from([0u8; 16]) } else { Arc::from(bytes) };
-        Self { buffer: Buffer::new(name, bytes.len() as u64, Lifetime::Scene), pending: Some(bytes) }
-    }
-
-    /// Declares its upload, the first time.
-    fn upload(&mut self, g: &mut Graph) {
-        if let Some(bytes) = self.pending.take() {
-            g.upload(&mut self.buffer, bytes);
-        }
-    }
-}
-
-/// An image that is filled once.
-pub(crate) struct FilledImage {
-    /// What passes read.
-    pub image: Image,
-    pending: Option<Arc<[u8]>>,
-}
-
-impl FilledImage {
-    fn new(name: &str, desc: ImageDesc, bytes: Arc<[u8]>) -> Self {
-        Self { image: Image::new(name, desc, Lifetime::Scene), pending: Some(bytes) }
-    }
-
-    fn upload(&mut self, g: &mut Graph) {
-        if let Some(bytes) = self.pending.take() {
-            g.upload_image(&mut self.image, bytes);
-        }
-    }
-}
 
 /// Everything about the scene that is on the device.
 pub(crate) struct SceneBuffers {
@@ -72,17 +34,13 @@ pub(crate) struct SceneBuffers {
     pub atlas_linear: FilledImage,
     pub lights: Filled,
     pub light_count: u32,
-    /// Present once something asks for occlusion.
-    pub bvh: Option<Bvh>,
+    /// Where each mesh lies in `indices` and `positions`.
+    pub mesh_places: Vec<MeshRange>,
+    mesh_bounds: Vec<Option<Bounds>>,
+    /// The instances that moved since the last update.
+    moved: BTreeSet<usize>,
     base_materials: Vec<types::Material>,
     uploaded_materials: Option<Arc<[u8]>>,
-}
-
-/// The hierarchy that occlusion is asked of.
-pub(crate) struct Bvh {
-    pub nodes: Filled,
-    pub triangles: Filled,
-    pub instances: Filled,
 }
 
 impl SceneBuffers {
@@ -98,10 +56,10 @@ impl SceneBuffers {
         let has_tangents = scene.meshes.iter().any(|mesh| !mesh.tangents.is_empty());
         let has_uvs = scene.meshes.iter().any(|mesh| mesh.has_uv);
         let has_colors = scene.meshes.iter().any(|mesh| !mesh.colors.is_empty());
-        let mut places = Vec::new();
+        let mut mesh_places = Vec::new();
         for mesh in &scene.meshes {
             let count = mesh.positions.len();
-            places.push((indices.len() as u32, positions.len() as u32));
+            mesh_places.push(MeshRange { first_index: indices.len() as u32, first_vertex: positions.len() as u32 });
             indices.extend(&mesh.indices);
             positions.extend(&mesh.positions);
             normals.extend(&mesh.normals);
@@ -124,25 +82,13 @@ impl SceneBuffers {
                 limit: "2^32 vertices or indices",
             });
         }
-        let mut draws = Vec::new();
-        let mut instances = Vec::new();
-        for (index, instance) in scene.instances.iter().enumerate() {
-            let mesh = &scene.meshes[instance.mesh];
-            let (first_index, first_vertex) = places[instance.mesh];
-            let flag = |set: bool, flag: u32| if set { flag } else { 0 };
-            let scene_from_local = DAffine3::from_translation(-center) * instance.world_from_local;
-            instances.push(types::Instance {
-                scene_from_local: rows(&scene_from_local),
-                material: mesh.material as u32,
-                first_index,
-                first_vertex,
-                flags: flag(instance.mirrors(), c::INSTANCE_MIRRORED)
-                    | flag(!mesh.tangents.is_empty(), c::INSTANCE_HAS_TANGENTS)
-                    | flag(mesh.has_uv, c::INSTANCE_HAS_UV)
-                    | flag(!mesh.colors.is_empty(), c::INSTANCE_HAS_COLORS),
-            });
-            draws.push(Draw { vertices: mesh.indices.len() as u32, instance: index as u32 });
-        }
+        let draw = |(index, instance): (usize, &Instance)| Draw {
+            vertices: scene.meshes[instance.mesh].indices.len() as u32,
+            instance: index as u32,
+        };
+        let draws: Vec<Draw> = scene.instances.iter().enumerate().map(draw).collect();
+        let instances = instance_records(scene, &mesh_places, center);
+        let mesh_bounds: Vec<Option<Bounds>> = scene.meshes.iter().map(Mesh::bounds).collect();
         let light_data: Vec<types::Light> = lights.iter().map(|light| light_record(light, center)).collect();
         let records: Vec<types::TextureRecord> = atlas.records.iter().map(texture_record).collect();
         let base_materials: Vec<types::Material> = scene.materials.iter().map(|m| material_record(m, atlas)).collect();
@@ -150,7 +96,7 @@ impl SceneBuffers {
         let materials_bytes = (base_materials.len().max(1) * size_of::<types::Material>()) as u64;
         Ok(Self {
             center,
-            scene_unit: scene_unit(scene, center),
+            scene_unit: scene_unit(scene, &mesh_bounds, center),
             draws: draws.into(),
             instances: Filled::new("instances", &instances),
             indices: Filled::new("indices", &indices),
@@ -165,41 +111,47 @@ impl SceneBuffers {
             atlas_linear: atlas_image("atlas_linear", Format::Rgba8, &atlas.linear),
             lights: Filled::new("lights", &light_data),
             light_count: light_data.len() as u32,
-            bvh: None,
+            mesh_places,
+            mesh_bounds,
+            moved: BTreeSet::new(),
             base_materials,
             uploaded_materials: None,
         })
     }
 
-    /// Builds the hierarchy for occlusion, if it is not there yet.
-    pub fn build_bvh(&mut self, scene: &Scene) -> Result<(), RenderError> {
-        if self.bvh.is_some() {
-            return Ok(());
-        }
-        let meshes = scene
-            .meshes
-            .iter()
-            .map(|mesh| MeshBvh::build(&mesh.positions, &mesh.indices))
-            .collect::<Result<Vec<_>, _>>()?;
-        let to_scene = DAffine3::from_translation(-self.center);
-        let placements: Vec<(usize, DAffine3)> =
-            scene.instances.iter().map(|instance| (instance.mesh, to_scene * instance.world_from_local)).collect();
-        let bvh = SceneBvh::build(&placements, &meshes)?;
-        self.bvh = Some(Bvh {
-            nodes: Filled::new("bvh_nodes", &bvh.nodes),
-            triangles: Filled::new("bvh_triangles", &bvh.triangles),
-            instances: Filled::new("bvh_instances", &bvh.instances),
-        });
-        Ok(())
+    /// From the space of an instance's mesh to scene space.
+    pub fn scene_from_local(&self, instance: &Instance) -> DAffine3 {
+        DAffine3::from_translation(-self.center) * instance.world_from_local
     }
 
-    /// Declares the uploads that are still to be done.
-    pub fn upload(&mut self, g: &mut Graph) {
-        let bvh = self.bvh.iter_mut().flat_map(|bvh| [&mut bvh.nodes, &mut bvh.triangles, &mut bvh.instances]);
+    /// Takes note that an instance moved.
+    pub fn note_moved(&mut self, instance: usize) {
+        self.moved.insert(instance);
+    }
+
+    /// Whether an instance of a mesh can be there: within the coordinates that rays can be traced through.
+    pub fn can_be_at(&self, mesh: usize, world_from_local: DAffine3) -> bool {
+        let scene_from_local = DAffine3::from_translation(-self.center) * world_from_local;
+        let limit = DVec3::splat(f64::from(LARGEST_COORDINATE));
+        // Written so that NaN fails.
+        scene_from_local.is_finite()
+            && corners(self.mesh_bounds[mesh], scene_from_local).all(|corner| corner.abs().cmple(limit).all())
+    }
+
+    /// Declares the uploads that are still to be done, and those that follow from instances that moved.
+    pub fn update(&mut self, g: &mut Graph, scene: &Scene) {
+        const FIRST: &str = "first frame of the scene";
+        if let Some(why) = why_moved(&self.moved) {
+            self.scene_unit = scene_unit(scene, &self.mesh_bounds, self.center);
+            g.because(if self.instances.is_pending() { FIRST.to_owned() } else { why });
+            self.instances.replace(&instance_records(scene, &self.mesh_places, self.center));
+            self.instances.upload(g);
+            self.moved.clear();
+        }
+        g.because(FIRST);
+        self.instances.upload(g);
+        self.upload_triangles(g);
         let buffers = [
-            &mut self.instances,
-            &mut self.indices,
-            &mut self.positions,
             &mut self.normals,
             &mut self.tangents,
             &mut self.uvs,
@@ -210,13 +162,14 @@ impl SceneBuffers {
         for filled in buffers {
             filled.upload(g);
         }
-        g.because("the first frame that asks for occlusion");
-        for filled in bvh {
-            filled.upload(g);
-        }
-        g.because("first frame of the scene");
         self.atlas_srgb.upload(g);
         self.atlas_linear.upload(g);
+    }
+
+    /// Declares the uploads of what triangles are made of, if they are still to be done.
+    pub fn upload_triangles(&mut self, g: &mut Graph) {
+        self.indices.upload(g);
+        self.positions.upload(g);
     }
 
     /// Declares the upload of the materials with the glints' part as it is now, if that differs from the last one.
@@ -245,9 +198,53 @@ impl SceneBuffers {
     }
 }
 
+/// Why something is made again after instances moved; nothing where none did.
+pub(crate) fn why_moved(moved: &BTreeSet<usize>) -> Option<String> {
+    match moved.len() {
+        0 => None,
+        1 => moved.first().map(|index| format!("instance {index} moved")),
+        count => Some(format!("{count} instances moved")),
+    }
+}
+
+/// Each instance as shaders read it.
+fn instance_records(scene: &Scene, mesh_places: &[MeshRange], center: DVec3) -> Vec<types::Instance> {
+    let flag = |set: bool, flag: u32| if set { flag } else { 0 };
+    let record = |instance: &Instance| {
+        let mesh = &scene.meshes[instance.mesh];
+        let MeshRange { first_index, first_vertex } = mesh_places[instance.mesh];
+        types::Instance {
+            scene_from_local: rows(&(DAffine3::from_translation(-center) * instance.world_from_local)),
+            material: mesh.material as u32,
+            first_index,
+            first_vertex,
+            flags: flag(instance.mirrors(), c::INSTANCE_MIRRORED)
+                | flag(!mesh.tangents.is_empty(), c::INSTANCE_HAS_TANGENTS)
+                | flag(mesh.has_uv, c::INSTANCE_HAS_UV)
+                | flag(!mesh.colors.is_empty(), c::INSTANCE_HAS_COLORS),
+        }
+    };
+    scene.instances.iter().map(record).collect()
+}
+
+/// The corners of a box after a map; none of no box.
+fn corners(bounds: Option<Bounds>, map: DAffine3) -> impl Iterator<Item = DVec3> {
+    bounds.into_iter().flat_map(move |Bounds { min, max }| {
+        (0..8).map(move |k| {
+            let pick = |axis: usize| if k >> axis & 1 == 0 { min[axis] } else { max[axis] };
+            map.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
+        })
+    })
+}
+
 /// The least power of two that no coordinate of the scene exceeds, about its centre; 1 for a scene of points or nothing.
-fn scene_unit(scene: &Scene, center: DVec3) -> f32 {
-    let reach = scene.bounds().map_or(0.0, |bounds| (bounds.max - center).max_element());
+fn scene_unit(scene: &Scene, mesh_bounds: &[Option<Bounds>], center: DVec3) -> f32 {
+    let of_instance = |instance: &Instance| corners(mesh_bounds[instance.mesh], instance.world_from_local);
+    let reach = scene
+        .instances
+        .iter()
+        .flat_map(of_instance)
+        .fold(0.0f64, |reach, corner| reach.max((corner - center).abs().max_element()));
     if reach > 0.0 { reach.log2().ceil().clamp(-100.0, 100.0).exp2() as f32 } else { 1.0 }
 }
 
@@ -257,7 +254,7 @@ fn padded<const N: usize>(elements: &[[f32; N]], count: usize) -> impl Iterator<
 }
 
 /// The three rows of an affine map.
-fn rows(map: &DAffine3) -> [[f32; 4]; 3] {
+pub(crate) fn rows(map: &DAffine3) -> [[f32; 4]; 3] {
     let columns = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis, map.translation];
     std::array::from_fn(|row| columns.map(|column| column[row] as f32))
 }

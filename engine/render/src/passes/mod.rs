@@ -9,6 +9,7 @@ pub(crate) mod occlusion;
 pub(crate) mod shadows;
 pub(crate) mod surface;
 pub(crate) mod tonemap;
+pub(crate) mod trace;
 pub(crate) mod visibility;
 
 pub(crate) use surface::GBuffer;
