@@ -276,8 +276,11 @@ fn counts_depend_on_every_bit_and_on_nothing_else() {
     let in_parts = answers(&mut gpu, query_shader(None), set, &queries, 4500);
     assert!(in_parts.iter().all(|answer| answer.over == 1));
     assert_eq!(counts(&exact), counts(&in_parts));
+    let cut = |axis| format!("packDouble2x32(unpackDouble2x32(corner.{axis}) & uvec2(0xe0000000u, ~0u))");
+    // The bits that a float lacks, by hand: Mesa 25 folds a conversion to float and back away.
+    let as_float = format!("corner = dvec2({}, {}); dvec2 square = floor(corner);", cut('x'), cut('y'));
     for change in [
-        ("dvec2 square = floor(corner);", "corner = dvec2(vec2(corner)); dvec2 square = floor(corner);"),
+        ("dvec2 square = floor(corner);", as_float.as_str()),
         ("low >= 0.0lf && high < 0.0lf", "low >= 1e-6lf * -high && high < 0.0lf"),
         ("<= 4.0lf * sin2_half_gamma", "<= 4.004lf * sin2_half_gamma"),
     ] {

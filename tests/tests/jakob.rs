@@ -182,7 +182,7 @@ fn counts_differ_once_the_tree_is_walked_wrongly() {
         ("jakob_overlap", "chord < within - MARGIN", "chord < within + 0.02"),
         ("jakob_overlap", "place + reach;", "place + 0.9 * reach;"),
         ("jakob_tree", "dvec2(draw(key, at), draw(key, at + 1u))", "dvec2(draw(key, at), draw(key, at))"),
-        ("jakob_tree", "split.undecided - low : low", "low : split.undecided - low"),
+        ("jakob_tree", "split.at_bit) & 1u) != 0u", "split.at_bit) & 1u) == 0u"),
         ("jakob_tree", "LISTED_DRAW + 64u * flake + 24u", "LISTED_DRAW + 64u * flake + 23u"),
     ] {
         let counter = Counter::with_change(file, from, to);

@@ -13,8 +13,8 @@ use std::path::PathBuf;
     name = "mica",
     version,
     args_override_self = true,
-    after_help = "Exit codes: 0 done; 2 bad input or usage; 3 no usable device or driver; 4 out of memory or device \
-                  lost; 130 interrupted, with what was finished kept."
+    after_help = "Exit codes: 0 done; 2 bad input or usage; 3 no device or driver that can do it; 4 out of memory or device lost; \
+                  130 interrupted, with what was finished kept."
 )]
 pub struct Cli {
     /// What to do.
@@ -88,10 +88,12 @@ pub struct SceneArgs {
     /// Factor of the radiance before tone mapping, in stops.
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, allow_hyphen_values = true)]
     pub exposure: f64,
-    /// Who answers whether something lies between two points; `auto` is `bvh` in this build.
+    /// Who answers whether something lies between two points: ray queries of the device, a hierarchy of bounding volumes
+    /// in compute shaders, or nobody, and everything is lit. `auto` takes ray queries on GPUs that offer them, else `bvh`.
     #[arg(long, value_enum, default_value_t = OcclusionChoice::Auto)]
     pub occlusion: OcclusionChoice,
-    /// A device, by a part of its name or its number (see `mica doctor`). Default: the best there is.
+    /// A device, by its number or a part of its name or of its driver's name and version (see `mica doctor`). Default:
+    /// the best there is.
     #[arg(long, value_name = "NAME|INDEX")]
     pub device: Option<String>,
     /// Most device memory to take. Default: all of it; on a CPU device, three quarters of what is free.
@@ -204,7 +206,8 @@ pub struct AccuracyArgs {
     /// Samples of each pixel of the sheet, averaged.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub samples: u32,
-    /// A device, by a part of its name or its number (see `mica doctor`). Default: the best there is.
+    /// A device, by its number or a part of its name or of its driver's name and version (see `mica doctor`). Default:
+    /// the best there is.
     #[arg(long, value_name = "NAME|INDEX")]
     pub device: Option<String>,
     /// Most device memory to take, as in `mica render`.
@@ -227,7 +230,8 @@ pub struct AccuracyArgs {
 /// `mica doctor`.
 #[derive(Debug, Args)]
 pub struct DoctorArgs {
-    /// The device to try, by a part of its name or its number. Default: the best there is.
+    /// The device to try, by its number or a part of its name or of its driver's name and version. Default: the best
+    /// there is.
     #[arg(long, value_name = "NAME|INDEX")]
     pub device: Option<String>,
     /// Print JSON.

@@ -8,6 +8,7 @@ use crate::session::Session;
 use crate::table;
 use clap::Parser;
 use mica_gpu::{Device, DeviceInfo, DeviceOptions, Error, Timing, devices};
+use mica_render::OcclusionBackend;
 use serde::Serialize;
 use std::ffi::OsString;
 use std::time::Instant;
@@ -33,7 +34,9 @@ struct DoctorReport {
     schema: &'static str,
     /// Whether a render would work.
     works: bool,
+    /// Of all drivers.
     devices: Vec<DeviceFound>,
+    /// That of the device which would be used.
     occlusion: Occlusion,
     validation: Validation,
     missing: Vec<Missing>,
@@ -50,6 +53,10 @@ struct DeviceFound {
     memory_bytes: u64,
     measures_time: bool,
     ray_query: bool,
+    /// The extensions and features that it lacks for ray queries.
+    ray_query_lacks: Vec<String>,
+    /// What `--occlusion auto` takes there.
+    occlusion: Occlusion,
     /// Why it cannot serve; none if it can.
     unusable: Option<String>,
 }
@@ -65,16 +72,28 @@ impl DeviceFound {
             memory_bytes: info.limits.device_memory_bytes,
             measures_time: info.limits.timestamp_valid_bits > 0,
             ray_query: info.offers_ray_query(),
+            ray_query_lacks: info.ray_query_lacks.clone(),
+            occlusion: Occlusion::on(info),
             unusable: info.unusable.clone(),
         }
     }
 }
 
 /// Who would answer questions about occlusion.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 struct Occlusion {
     body: &'static str,
     why: String,
+}
+
+impl Occlusion {
+    fn on(info: &DeviceInfo) -> Self {
+        if info.unusable.is_some() {
+            return Self { body: OcclusionBackend::None.name(), why: "the device cannot be used".to_owned() };
+        }
+        let (backend, why) = OcclusionBackend::auto(info);
+        Self { body: backend.name(), why }
+    }
 }
 
 /// Whether `--validation` would work. Only development needs it.
@@ -99,6 +118,8 @@ struct Missing {
 struct Trial {
     /// The device it ran on.
     device: Option<String>,
+    /// Its number.
+    index: Option<usize>,
     /// From nothing to the picture.
     ns: Option<u64>,
     error: Option<String>,
@@ -125,20 +146,14 @@ fn examine(args: &DoctorArgs) -> DoctorReport {
     }
     let trial = trial(args);
     let devices: Vec<DeviceFound> = found.iter().flatten().map(DeviceFound::new).collect();
-    let chosen = devices.iter().find(|device| Some(&device.name) == trial.device.as_ref());
-    let offered = match chosen {
-        Some(DeviceFound { ray_query: true, .. }) => "; the device offers ray queries, which are not used yet",
-        Some(_) => "; the device offers no ray queries",
-        None => "",
-    };
+    let chosen = devices.iter().find(|device| Some(device.index) == trial.index);
+    let nobody = || Occlusion { body: OcclusionBackend::None.name(), why: "there is no device that works".to_owned() };
+    let occlusion = chosen.map_or_else(nobody, |device| device.occlusion.clone());
     DoctorReport {
         schema: "mica-doctor-1",
         works: trial.error.is_none(),
-        occlusion: Occlusion {
-            body: "bvh",
-            why: format!("the only body of this build, and every device runs it{offered}"),
-        },
         devices,
+        occlusion,
         validation,
         missing,
         trial,
@@ -148,7 +163,7 @@ fn examine(args: &DoctorArgs) -> DoctorReport {
 /// Renders 16 by 16 pixels of a sphere through all passes, with small tables, and looks at what came back.
 fn trial(args: &DoctorArgs) -> Trial {
     let start = Instant::now();
-    let run = || -> Result<String, Failure> {
+    let run = || -> Result<DeviceInfo, Failure> {
         let words = ["mica", "render", "sphere", "--size", "16x16", "--set", "samples=1", "--set", "depth=2"];
         let words = words.map(OsString::from);
         let device = args.device.iter().flat_map(|device| [OsString::from("--device"), device.into()]);
@@ -161,7 +176,7 @@ fn trial(args: &DoctorArgs) -> Trial {
         session.precompute(&mut progress)?;
         let shot = session.frame(None, Timing::Overlapped, true)?;
         match shot.picture.map(|picture| picture.summary()) {
-            Some(summary) if summary.nonfinite == 0 && summary.max > 0.0 => Ok(session.device().name.clone()),
+            Some(summary) if summary.nonfinite == 0 && summary.max > 0.0 => Ok(session.device().clone()),
             Some(summary) => Err(Failure::with_code(
                 NO_DEVICE,
                 format!(
@@ -176,7 +191,8 @@ fn trial(args: &DoctorArgs) -> Trial {
     Trial {
         ns: result.is_ok().then(|| u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX)),
         error: result.as_ref().err().map(ToString::to_string),
-        device: result.ok(),
+        index: result.as_ref().ok().map(|info| info.index),
+        device: result.ok().map(|info| info.name),
     }
 }
 
@@ -192,14 +208,15 @@ fn for_people(report: &DoctorReport) -> String {
             device.api,
             table::bytes(device.memory_bytes)
         );
-        let time = if device.measures_time { "measures time" } else { "measures no time" };
-        let rays = if device.ray_query { "offers ray queries" } else { "offers no ray queries" };
-        text += &match &device.unusable {
-            None => format!("  usable, {time}, {rays}\n"),
-            Some(why) => format!("  not usable: {why}\n"),
-        };
+        if let Some(why) = &device.unusable {
+            text += &format!("  not usable: {why}\n");
+            continue;
+        }
+        text += if device.measures_time { "  usable, measures time\n" } else { "  usable, measures no time\n" };
+        let Occlusion { body, why } = &device.occlusion;
+        let rays = if device.ray_query { "offered" } else { "not offered" };
+        text += &format!("  occlusion: {body}, because {why}; ray queries {rays}\n");
     }
-    text += &format!("occlusion: {} ({})\n", report.occlusion.body, report.occlusion.why);
     text += &match &report.validation.error {
         None => "validation: there, for --validation\n".to_owned(),
         Some(error) => format!("validation: not there, which only --validation needs ({error})\n"),
@@ -210,13 +227,13 @@ fn for_people(report: &DoctorReport) -> String {
     }
     text += &match &report.trial {
         Trial { error: Some(error), .. } => format!("trial: failed: {error}\n"),
-        Trial { device, ns, .. } => {
-            format!(
-                "trial: 16x16 pixels on {} in {} ms\n",
-                device.as_deref().unwrap_or_default(),
-                table::milliseconds(*ns)
-            )
-        }
+        Trial { device, index, ns, .. } => format!(
+            "trial: 16x16 pixels on device {}, {}, in {} ms, occlusion {}\n",
+            index.unwrap_or_default(),
+            device.as_deref().unwrap_or_default(),
+            table::milliseconds(*ns),
+            report.occlusion.body
+        ),
     };
     text += if report.works { "A render works here.\n" } else { "A render does not work here.\n" };
     text

@@ -33,6 +33,7 @@ pub fn explain(args: &ExplainArgs) -> Result<(), Failure> {
         size: session.view.size,
         device: DeviceReport::new(session.device()),
         occlusion: session.renderer.occlusion().name(),
+        occlusion_why: session.occlusion_why.clone(),
         passes,
         culled: plan.culled.clone(),
         first_frame: FrameReport::new(&plan),
@@ -51,6 +52,7 @@ struct ExplainReport {
     size: [u32; 2],
     device: DeviceReport,
     occlusion: &'static str,
+    occlusion_why: String,
     passes: Vec<PassReport>,
     /// Passes that were declared and that nothing needs.
     culled: Vec<String>,
@@ -159,8 +161,8 @@ fn resources(plan: &Plan) -> Vec<ResourceReport> {
 fn for_people(report: &ExplainReport) -> String {
     let [width, height] = report.size;
     let mut text = format!(
-        "{}, {}, {width}x{height} on {}, occlusion {}\n",
-        report.scene, report.method, report.device.name, report.occlusion
+        "{}, {}, {width}x{height} on {} ({})\nocclusion: {}, because {}\n",
+        report.scene, report.method, report.device.name, report.device.driver, report.occlusion, report.occlusion_why
     );
     text += "\nbuilt once, in the first frame\n";
     text += &passes_text(report.passes.iter().enumerate().filter(|(_, pass)| pass.once));

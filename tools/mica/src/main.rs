@@ -10,6 +10,7 @@ mod explain;
 mod interrupt;
 mod measure;
 mod methods;
+mod occlusion_choice;
 mod oracle;
 mod output;
 mod picture;

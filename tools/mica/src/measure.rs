@@ -1,6 +1,7 @@
 //! Times of passes and frames, and what they come to.
 
 use crate::session::Shot;
+use mica_shaders::types::RayCounts;
 use serde::Serialize;
 
 /// A pass, with its times over the measured frames; runs of the same name within a frame are added up.
@@ -46,6 +47,33 @@ pub fn sums(shot: &Shot, updates: bool) -> Vec<PassSum> {
                 sum.ns = sum.ns.zip(time.ns).map(|(a, b)| a + b);
             }
             None => sums.push(PassSum { name: pass.name.clone(), why: pass.why.clone(), runs: 1, ns: time.ns }),
+        }
+    }
+    sums
+}
+
+/// The rays of a pass in one frame, all its runs together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TracedRays {
+    /// The pass.
+    pub pass: &'static str,
+    /// How many it traced.
+    pub rays: u64,
+    /// Those of them that ran out of steps.
+    pub cut_short: u64,
+}
+
+/// Counts of the runs of passes, those of one name added up.
+pub fn rays(counts: impl IntoIterator<Item = (&'static str, RayCounts)>) -> Vec<TracedRays> {
+    let mut sums: Vec<TracedRays> = Vec::new();
+    for (pass, RayCounts { traced, cut_short, .. }) in counts {
+        let (traced, cut_short) = (u64::from(traced), u64::from(cut_short));
+        match sums.iter_mut().find(|sum| sum.pass == pass) {
+            Some(sum) => {
+                sum.rays += traced;
+                sum.cut_short += cut_short;
+            }
+            None => sums.push(TracedRays { pass, rays: traced, cut_short }),
         }
     }
     sums
@@ -128,7 +156,7 @@ pub fn is_of_glints(pass: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::median;
+    use super::*;
 
     #[test]
     fn the_median_is_the_middle() {
@@ -137,5 +165,13 @@ mod tests {
         assert_eq!(median(&[9, 1, 5]), Some(5));
         assert_eq!(median(&[9, 1, 5, 6]), Some(5));
         assert_eq!(median(&[u64::MAX, u64::MAX]), Some(u64::MAX));
+    }
+
+    #[test]
+    fn rays_of_one_pass_add_up_beyond_32_bits() {
+        let counts = |traced, cut_short| RayCounts { traced, cut_short };
+        let all = rays([("shadows", counts(u32::MAX, 1)), ("occlusion", counts(5, 0)), ("shadows", counts(2, 3))]);
+        let shadows = TracedRays { pass: "shadows", rays: (1 << 32) + 1, cut_short: 4 };
+        assert_eq!(all, [shadows, TracedRays { pass: "occlusion", rays: 5, cut_short: 0 }]);
     }
 }

@@ -9,8 +9,8 @@ use crate::output::{self, Destination};
 use crate::picture::Picture;
 use crate::progress::Progress;
 use crate::report::{
-    CameraReport, DeviceReport, EnvironmentReport, FrameCounts, FrameTimes, LeftOutReport, MemoryReport, RenderReport,
-    SCHEMA, UpdateReport, settings,
+    CameraReport, DeviceReport, EnvironmentReport, FrameCounts, FrameTimes, LeftOutReport, MemoryReport, RaysReport,
+    RenderReport, SCHEMA, UpdateReport, settings,
 };
 use crate::report_text;
 use crate::session::{Session, Shot};
@@ -58,6 +58,9 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
             interrupted: interrupt.requested(),
         },
     );
+    for warning in report.rays.iter().filter_map(RaysReport::warning) {
+        log::warn!("{warning}");
+    }
     let attributes = attributes(&report);
     for (destination, kind) in &outputs.pictures {
         destination.write(&match kind {
@@ -226,6 +229,7 @@ fn report(session: &Session, outcome: &Outcome) -> RenderReport {
     let every_frame = measurements.passes(&of_picture);
     let sum = |rows: &mut dyn Iterator<Item = &PassRow>| rows.map(|row| row.median_ns).sum::<Option<u64>>();
     let isolated_sum = sum(&mut every_frame.iter());
+    let rays = shot.rays.iter().map(|traced| RaysReport::new(traced, &every_frame)).collect();
     let glint_ns = sum(&mut every_frame.iter().filter(|row| measure::is_of_glints(&row.name)));
     let mut passes = once(outcome.updates);
     passes.extend(every_frame);
@@ -248,6 +252,7 @@ fn report(session: &Session, outcome: &Outcome) -> RenderReport {
         lights: session.renderer.scene().lights.len() + args.scene.light.len(),
         device: DeviceReport::new(session.device()),
         occlusion: session.renderer.occlusion().name(),
+        occlusion_why: session.occlusion_why.clone(),
         frames: FrameCounts { warmup: outcome.warmup, measured: measurements.count() },
         passes,
         frame_ns: FrameTimes {
@@ -256,6 +261,7 @@ fn report(session: &Session, outcome: &Outcome) -> RenderReport {
             overlapped_cpu_median: measurements.cpu_median_ns(),
         },
         glint_ns,
+        rays,
         memory: session.executor.memory().into_iter().map(MemoryReport::new).collect(),
         updates: outcome.updates.to_vec(),
         image: outcome.picture.summary(),

@@ -1,6 +1,6 @@
 //! The report of a render, as JSON.
 
-use crate::measure::PassRow;
+use crate::measure::{PassRow, TracedRays};
 use crate::picture::ImageSummary;
 use mica_gpu::{DeviceInfo, MemoryRow};
 use mica_render::scene::Camera;
@@ -28,12 +28,17 @@ pub struct RenderReport {
     /// Lights of the scene and of the command line.
     pub lights: usize,
     pub device: DeviceReport,
+    /// Who answered what blocks light.
     pub occlusion: &'static str,
+    /// Why that one.
+    pub occlusion_why: String,
     pub frames: FrameCounts,
     pub passes: Vec<PassRow>,
     pub frame_ns: FrameTimes,
     /// Sum of the medians of the passes that are there for the glints.
     pub glint_ns: Option<u64>,
+    /// By pass.
+    pub rays: Vec<RaysReport>,
     pub memory: Vec<MemoryReport>,
     pub updates: Vec<UpdateReport>,
     pub image: ImageSummary,
@@ -107,6 +112,38 @@ pub struct FrameTimes {
     pub overlapped_cpu_median: Option<u64>,
 }
 
+/// The rays of a pass in one frame.
+#[derive(Serialize)]
+pub struct RaysReport {
+    pub pass: &'static str,
+    pub rays: u64,
+    /// Those that ran out of steps: what they had not found by then did not block.
+    pub cut_short: u64,
+    /// Millions a second, over the pass's median time.
+    pub mrays_per_s: Option<f64>,
+}
+
+impl RaysReport {
+    /// Of what was counted, with the times of the passes.
+    pub fn new(traced: &TracedRays, passes: &[PassRow]) -> Self {
+        let TracedRays { pass, rays, cut_short } = *traced;
+        let median_ns = passes.iter().find(|row| row.name == pass).and_then(|row| row.median_ns);
+        let mrays_per_s = median_ns.filter(|ns| *ns > 0).map(|ns| rays as f64 / ns as f64 * 1e3);
+        Self { pass, rays, cut_short, mrays_per_s }
+    }
+
+    /// What is to be said if rays were cut short.
+    pub fn warning(&self) -> Option<String> {
+        let Self { pass, rays, cut_short, .. } = self;
+        (*cut_short > 0).then(|| {
+            format!(
+                "{pass}: {cut_short} of {rays} rays ran out of steps, and what they had not found by then does not block \
+                 light in the picture; use --occlusion ray-query where a device offers it, or a scene with fewer triangles"
+            )
+        })
+    }
+}
+
 #[derive(Serialize)]
 pub struct MemoryReport {
     pub name: String,
@@ -167,5 +204,28 @@ pub fn json(value: Value) -> Json {
         Value::Flag(flag) => Json::from(flag),
         Value::Word(word) => Json::from(word),
         Value::Color(color) => Json::from(color.to_vec()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_are_put_beside_the_time_of_their_pass() {
+        let row = |name: &str, median_ns| PassRow {
+            name: name.to_owned(),
+            runs: 1,
+            once: false,
+            median_ns,
+            min_ns: None,
+            max_ns: None,
+        };
+        let passes = [row("visibility", Some(7)), row("shadows", Some(2_000_000)), row("occlusion", None)];
+        let of = |pass, cut_short| RaysReport::new(&TracedRays { pass, rays: 5_000, cut_short }, &passes);
+        assert_eq!(of("shadows", 0).mrays_per_s, Some(2.5));
+        assert_eq!(of("occlusion", 0).mrays_per_s, None);
+        assert_eq!(of("shadows", 0).warning(), None);
+        assert!(of("shadows", 3).warning().is_some_and(|line| line.starts_with("shadows: 3 of 5000 rays")));
     }
 }

@@ -1,7 +1,7 @@
 //! The report of a render as text: what each pass costs, what was built once, what memory is taken.
 
 use crate::error::one_line;
-use crate::report::{FrameTimes, MemoryReport, RenderReport, UpdateReport};
+use crate::report::{FrameTimes, MemoryReport, RaysReport, RenderReport, UpdateReport};
 use crate::table::{Column, bytes, milliseconds, table};
 use std::path::PathBuf;
 
@@ -24,7 +24,7 @@ pub fn for_people<'a>(report: &RenderReport, paths: impl Iterator<Item = &'a Pat
     let FrameTimes { isolated_sum, overlapped_median, overlapped_cpu_median } = report.frame_ns;
     text += &format!(
         "\nframe: {} ms as it runs (processor {} ms), {} ms pass by pass, of which {} ms for glints; medians of {} \
-         after {} to warm up\n\n",
+         after {} to warm up\n",
         milliseconds(overlapped_median),
         milliseconds(overlapped_cpu_median),
         milliseconds(isolated_sum),
@@ -32,6 +32,9 @@ pub fn for_people<'a>(report: &RenderReport, paths: impl Iterator<Item = &'a Pat
         report.frames.measured,
         report.frames.warmup,
     );
+    text +=
+        &format!("occlusion: {}, because {}{}\n", report.occlusion, report.occlusion_why, rays_traced(&report.rays));
+    text.push('\n');
     text += &updates_table(&report.updates);
     text += &memory_table(&report.memory);
     if !report.left_out.is_empty() {
@@ -70,6 +73,19 @@ fn every_frame_table(report: &RenderReport) -> String {
         Column::Right("share"),
     ];
     table(&columns, &rows)
+}
+
+/// How many rays each pass traced, and how fast; nothing where none did.
+fn rays_traced(rays: &[RaysReport]) -> String {
+    let of_pass = |of: &RaysReport| {
+        let speed = of.mrays_per_s.map(|speed| format!(", {speed:.2} million a second")).unwrap_or_default();
+        let cut = if of.cut_short > 0 { format!(", {} cut short", of.cut_short) } else { String::new() };
+        format!("{} {}{speed}{cut}", of.pass, of.rays)
+    };
+    match rays {
+        [] => String::new(),
+        rays => format!("\nrays: {}", rays.iter().map(of_pass).collect::<Vec<_>>().join("; ")),
+    }
 }
 
 fn updates_table(updates: &[UpdateReport]) -> String {

@@ -1,15 +1,18 @@
 //! A scene on a device, set up as the command line says, and the frames that are made of it.
 
-use crate::args::{CameraChoice, OcclusionChoice, SceneArgs};
+use crate::args::{CameraChoice, SceneArgs};
 use crate::environment_choice;
 use crate::error::Failure;
+use crate::measure::{self, TracedRays};
+use crate::occlusion_choice;
 use crate::picture::Picture;
 use crate::progress::Progress;
 use crate::scene_choice::{self, ChosenScene};
 use mica_gpu::{Device, DeviceInfo, DeviceKind, DeviceOptions, Executor, ExecutorOptions, Run, Timing};
 use mica_graph::{Graph, Plan};
 use mica_render::scene::Camera;
-use mica_render::{Cache, Frame, LeftOut, OcclusionBackend, Renderer, Update, View, method};
+use mica_render::{Cache, Frame, LeftOut, Renderer, Update, View, method};
+use mica_shaders::types::RayCounts;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,6 +25,8 @@ pub struct Session {
     pub environment: String,
     /// How far it is turned, in degrees.
     pub environment_rotation_deg: f64,
+    /// Why occlusion is answered as it is.
+    pub occlusion_why: String,
     /// The scene, prepared.
     pub renderer: Renderer,
     /// What runs its frames.
@@ -42,6 +47,8 @@ pub struct Shot {
     pub left_out: Vec<LeftOut>,
     /// The picture, where it was wanted.
     pub picture: Option<Picture>,
+    /// The rays of each pass that traces any, where the picture was wanted.
+    pub rays: Vec<TracedRays>,
 }
 
 /// A frame that was declared and not executed.
@@ -80,7 +87,6 @@ impl Declared {
 impl Session {
     /// Loads the scene, finds a device, and applies all settings. No frame is made yet.
     pub fn new(args: &SceneArgs, progress: &mut Progress) -> Result<Self, Failure> {
-        let occlusion = occlusion(args.occlusion)?;
         if let Some(name) = &args.method {
             method(name)?;
         }
@@ -96,8 +102,12 @@ impl Session {
         let exposure = args.exposure.exp2() as f32;
         let view = View { exposure, ..View::new(camera, args.size) };
 
+        let device = Device::new(&DeviceOptions { select: args.device.clone(), validation: args.validation })?;
+        check_size(args.size, device.info())?;
+        let occlusion = occlusion_choice::choose(args.occlusion, device.info())?;
+
         let ChosenScene { name, scene, .. } = chosen;
-        let mut renderer = Renderer::new(scene, &args.light, environment.environment.as_ref(), occlusion)?;
+        let mut renderer = Renderer::new(scene, &args.light, environment.environment.as_ref(), occlusion.backend)?;
         for change in args.set.iter().chain(&args.glint) {
             change.check(renderer.materials())?;
         }
@@ -111,14 +121,13 @@ impl Session {
             log::warn!("{name}: no material glints (none has glint_count in its extras): settings have no effect");
         }
 
-        let device = Device::new(&DeviceOptions { select: args.device.clone(), validation: args.validation })?;
-        check_size(args.size, device.info())?;
         let cache = cache(args.cache.as_deref(), args.no_cache);
         let executor = executor(device, cache.as_ref(), args.memory)?;
         Ok(Self {
             scene: name,
             environment: environment.name,
             environment_rotation_deg: args.env_rotate,
+            occlusion_why: occlusion.why,
             renderer,
             executor,
             view,
@@ -168,30 +177,25 @@ impl Session {
         let updates_of = declared.updates_of();
         let Declared { graph: g, frame, .. } = &mut declared;
         let downloads = picture.then(|| (g.download_image(&frame.radiance), g.download_image(&frame.display)));
+        let counts: Vec<_> =
+            frame.rays.iter().filter(|_| picture).map(|of| (of.pass, g.download(&of.counts))).collect();
         let mut run = self.executor.run(std::mem::take(g), timing)?;
         let picture = downloads.map(|(radiance, display)| Picture {
             size: self.view.size,
             radiance: floats(&run.take(radiance)),
             display: run.take(display),
         });
+        let counts = counts.into_iter().map(|(pass, download)| (pass, run.take(download)));
+        let counts = counts.map(|(pass, bytes)| (pass, bytemuck::pod_read_unaligned::<RayCounts>(&bytes)));
+        let rays = measure::rays(counts);
         let is_update = updates_of(&run.plan);
-        Ok(Shot { is_update, run, left_out: declared.frame.left_out, picture })
+        Ok(Shot { is_update, run, left_out: declared.frame.left_out, picture, rays })
     }
 }
 
 /// 32-bit floats as the device stores them.
 fn floats(bytes: &[u8]) -> Vec<f32> {
     bytes.as_chunks().0.iter().map(|word| f32::from_ne_bytes(*word)).collect()
-}
-
-fn occlusion(choice: OcclusionChoice) -> Result<OcclusionBackend, Failure> {
-    match choice {
-        OcclusionChoice::Auto | OcclusionChoice::Bvh => Ok(OcclusionBackend::Bvh),
-        OcclusionChoice::None => Ok(OcclusionBackend::None),
-        OcclusionChoice::RayQuery => Err(Failure::bad_input(
-            "--occlusion ray-query: this build has no ray-query body yet; use bvh, which runs on every device",
-        )),
-    }
 }
 
 fn camera(choice: CameraChoice) -> Camera {
@@ -225,8 +229,8 @@ pub fn executor(
     cache: Option<&Cache>,
     memory_mebibytes: Option<u64>,
 ) -> Result<Executor, Failure> {
-    let name: String = device.info().name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
-    let pipeline_cache = cache.map(|cache| cache.folder().join(format!("pipelines-{name}.bin")));
+    let DeviceInfo { name, driver, driver_version, .. } = device.info();
+    let pipeline_cache = cache.map(|cache| cache.folder().join(pipelines_file([name, driver, driver_version])));
     let mut options = ExecutorOptions { pipeline_cache, ..Default::default() };
     if device.info().kind == DeviceKind::Cpu {
         // A driver on the processor grants more than there is, and the system then ends the process: stop before that.
@@ -240,9 +244,33 @@ pub fn executor(
     Ok(Executor::with_options(device, options)?)
 }
 
+/// The file for the pipelines of one driver on one device: two drivers may offer a device of the same name.
+fn pipelines_file(words: [&str; 3]) -> String {
+    let plain = words.join(" ").replace(|c: char| !c.is_ascii_alphanumeric() && c != '.', " ");
+    let mut name = plain.split_whitespace().collect::<Vec<_>>().join("-");
+    // Each of the words may be as long as a file name.
+    name.truncate(200);
+    format!("pipelines-{name}.bin")
+}
+
 /// What Linux could give to a process without swapping.
 fn available_memory_bytes() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     line.trim().strip_suffix(" kB")?.parse::<u64>().ok().map(|kibibytes| kibibytes * 1024)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::pipelines_file;
+
+    #[test]
+    fn drivers_of_one_device_keep_their_pipelines_apart() {
+        let of = |version| pipelines_file(["llvmpipe (LLVM 15.0.6, 256 bits)", "llvmpipe", version]);
+        let older = of("Mesa 22.3.6 (LLVM 15.0.6)");
+        assert_eq!(older, "pipelines-llvmpipe-LLVM-15.0.6-256-bits-llvmpipe-Mesa-22.3.6-LLVM-15.0.6.bin");
+        assert_ne!(older, of("Mesa 25.0.7-2~bpo12+1 (LLVM 15.0.6)"));
+        assert_eq!(pipelines_file(["../a/b", "\u{e9}\n", ""]), "pipelines-..-a-b.bin");
+        assert!(pipelines_file([&"x".repeat(256), &"y".repeat(256), "1"]).len() < 255);
+    }
 }

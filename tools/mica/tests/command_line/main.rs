@@ -3,6 +3,7 @@
 mod accuracy;
 mod information;
 mod mistakes;
+mod occlusion;
 mod oracle;
 mod render;
 

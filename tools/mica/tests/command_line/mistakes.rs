@@ -101,7 +101,6 @@ fn cameras_that_see_nothing() {
 fn options_that_do_not_exist_or_do_not_go_together() {
     wrong(&["--szie", "4x4"], &["--szie", "--size"]);
     wrong(&["--occlusion", "magic"], &["magic", "bvh"]);
-    wrong(&["--occlusion", "ray-query"], &["ray-query", "this build"]);
     wrong(&["--cache", "x", "--no-cache"], &["--cache", "--no-cache"]);
     wrong(&["--timing", "never"], &["never", "isolated"]);
     failed_in_one_line(&run(&[]), 2);
