@@ -20,6 +20,8 @@ void main() {
     float free = 1.0;
     if (asks) {
       vec3 mirrored = reflect(normalize(camera_ray(pixel)), seen.normal);
+      // Interpolated or mapped normals may mirror into the surface itself: then along it, or it would hide its own rim.
+      mirrored += max(1e-3 - dot(mirrored, seen.geometric_normal), 0.0) * seen.geometric_normal;
       vec3 origin = offset_origin(seen.position, seen.geometric_normal, frame.scene_unit);
       free = occluded(origin, mirrored, 0.0, 1e30) ? 0.0 : 1.0;
     }

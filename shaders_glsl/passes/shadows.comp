@@ -18,10 +18,19 @@ void main() {
     uint mask = 0u;
     vec3 origin = offset_origin(seen.position, seen.geometric_normal, frame.scene_unit);
     for (uint index = 0u; index < (seen.instance != 0u ? frame.light_count : 0u); ++index) {
-      Arrival arrival = arrival_at(lights[index], seen.position);
-      // Behind the surface is dark without asking.
-      bool behind = dot(arrival.direction, seen.geometric_normal) <= 0.0;
-      if (behind || occluded(origin, arrival.direction, 0.0, arrival.distance * 0.9999)) {
+      Light light = lights[index];
+      Arrival arrival = arrival_at(light, seen.position);
+      // Behind the surface, out of range and outside of a cone is dark without asking.
+      bool dark = dot(arrival.direction, seen.geometric_normal) <= 0.0 || arrival.irradiance == vec3(0.0);
+      vec3 towards = arrival.direction;
+      float t_max = 1e30;
+      if (light.kind != LIGHT_DIRECTIONAL) {
+        // Ends as far before the light as it starts before its surface: what a lamp lies on does not hide it, and a
+        // shade close to a far lamp does.
+        towards = offset_origin(light.position, -arrival.direction, frame.scene_unit) - origin;
+        t_max = dot(towards, arrival.direction) > 0.0 ? 1.0 : 0.0;
+      }
+      if (dark || occluded(origin, towards, 0.0, t_max)) {
         mask |= 1u << index;
       }
     }

@@ -92,22 +92,35 @@ vec4 sample_level(TextureRecord record, vec2 uv, int level) {
   return mix(top, bottom, part.y);
 }
 
-// A texture at `uv`, filtered over the footprint spanned by the two derivatives per pixel. The coordinates are brought
-// near zero first, so that tiling far from the origin keeps its texels.
+// Texture coordinates of the same texel near zero, where a float tells texels apart, along the axes on which the
+// texture repeats: mirrored or not, it does so after 2.
+vec2 near_zero(TextureRecord record, vec2 at) {
+  bvec2 ends = equal(uvec2(record.wrap, record.wrap >> 2) & 3u, uvec2(2u));
+  return mix(at - 2.0 * floor(0.5 * at), at, ends);
+}
+
+// Texture coordinates through the transform of a use of a texture.
+vec2 transformed(TextureUse use_of, vec2 uv) {
+  return vec2(dot(use_of.row_u, vec3(uv, 1.0)), dot(use_of.row_v, vec3(uv, 1.0)));
+}
+
+// A change of texture coordinates through that transform.
+vec2 transformed_change(TextureUse use_of, vec2 change) {
+  return vec2(dot(use_of.row_u.xy, change), dot(use_of.row_v.xy, change));
+}
+
+// A texture at `uv`, filtered over the footprint spanned by the two derivatives per pixel.
 vec4 sample_texture(TextureUse use_of, vec2 uv, vec2 ddx, vec2 ddy) {
   TextureRecord record = textures[use_of.texture];
   vec2 size = vec2(record.width, record.height);
-  vec2 here = vec2(dot(use_of.row_u, vec3(uv, 1.0)), dot(use_of.row_v, vec3(uv, 1.0)));
-  mat2 turn = mat2(use_of.row_u.x, use_of.row_v.x, use_of.row_u.y, use_of.row_v.y);
-  vec2 along_x = (turn * ddx) * size;
-  vec2 along_y = (turn * ddy) * size;
+  vec2 along_x = transformed_change(use_of, ddx) * size;
+  vec2 along_y = transformed_change(use_of, ddy) * size;
   float texels = sqrt(max(dot(along_x, along_x), dot(along_y, along_y)));
   float lod = clamp(log2(max(texels, 1e-8)), 0.0, float(record.mips - 1u));
   int level = int(lod);
   int next = min(level + 1, int(record.mips) - 1);
-  vec2 inside = here - 2.0 * floor(0.5 * here);
-  here = vec2((record.wrap & 3u) == 2u ? here.x : inside.x, ((record.wrap >> 2) & 3u) == 2u ? here.y : inside.y);
-  here = clamp(here, vec2(-4.0), vec2(4.0));
+  // Within the range of an integer, whatever is clamped there.
+  vec2 here = clamp(near_zero(record, transformed(use_of, uv)), vec2(-4.0), vec2(4.0));
   vec4 fine = sample_level(record, here, level);
   return next == level ? fine : mix(fine, sample_level(record, here, next), lod - float(level));
 }

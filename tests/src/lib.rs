@@ -9,6 +9,7 @@ pub mod shaders;
 pub mod shapes;
 pub mod sky;
 mod tally;
+pub mod triangles;
 pub mod twin;
 pub mod unusual;
 pub mod values;

@@ -21,6 +21,17 @@ impl Eye {
         View::new(Camera::looking_at("test", self.eye, self.target, self.vertical_fov_radians, 0.01), size)
     }
 
+    /// The direction, not of length 1, through a point of the picture, in pixels from its upper left corner.
+    pub fn ray(&self, size: [u32; 2], [x, y]: [f64; 2]) -> DVec3 {
+        let backwards = (self.eye - self.target).normalize();
+        let right = DVec3::Y.cross(backwards).normalize();
+        let up = backwards.cross(right);
+        let half_height = (0.5 * self.vertical_fov_radians).tan();
+        let [width, height] = size.map(f64::from);
+        let half_width = half_height * width / height;
+        (2.0 * x / width - 1.0) * half_width * right + (1.0 - 2.0 * y / height) * half_height * up - backwards
+    }
+
     /// The oracle's camera.
     pub fn oracle(&self) -> mica_oracle::scene::Camera {
         mica_oracle::scene::Camera {
@@ -92,18 +103,23 @@ pub fn sphere(material: Material, rings: u32) -> Scene {
     one_mesh("sphere", mesh, material)
 }
 
+/// A sphere that lies on a plane: instance 0 is the plane, 16 radii wide, and instance 1 the sphere of so many `rings`,
+/// which touches it in the middle, at `place`.
+pub fn sphere_on_plane(material: Material, rings: u32, radius: f64, place: DVec3) -> Scene {
+    let mut scene = plane(material.clone(), 1.0);
+    scene.meshes.append(&mut sphere(material, rings).meshes);
+    let scaled = |by: f64, to: DVec3| DAffine3::from_translation(to) * DAffine3::from_scale(DVec3::splat(by));
+    scene.instances[0].world_from_local = scaled(8.0 * radius, place);
+    let world_from_local = scaled(radius, place + radius * DVec3::Y);
+    scene.instances.push(Instance { mesh: 1, world_from_local, name: "sphere".to_owned() });
+    scene
+}
+
 /// The point of [`plane`] that [`OVER_PLANE`] sees through the centre of each pixel, and its area in texture space:
 /// that of the parallelogram spanned by its derivatives, from central differences of the exact point.
 pub fn seen_plane(size: [u32; 2]) -> Vec<(DVec3, f64)> {
-    let backwards = (OVER_PLANE.eye - OVER_PLANE.target).normalize();
-    let right = DVec3::Y.cross(backwards).normalize();
-    let up = backwards.cross(right);
-    let half_height = (0.5 * OVER_PLANE.vertical_fov_radians).tan();
-    let [width, height] = size.map(f64::from);
-    let half_width = half_height * width / height;
     let point = |x: f64, y: f64| {
-        let ray =
-            (2.0 * x / width - 1.0) * half_width * right + (1.0 - 2.0 * y / height) * half_height * up - backwards;
+        let ray = OVER_PLANE.ray(size, [x, y]);
         OVER_PLANE.eye - OVER_PLANE.eye.y / ray.y * ray
     };
     let pixels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (f64::from(x) + 0.5, f64::from(y) + 0.5)));

@@ -1,9 +1,11 @@
 //! The whole program against the oracle and against its claims, under validation and synchronisation validation.
 
+mod alpha_masks;
 mod atanasov;
 mod borrowed;
 mod chermain;
 mod claims;
+mod contact_shadows;
 mod deliot_belcour;
 mod flake_queries;
 mod flakes;
@@ -15,6 +17,7 @@ mod jakob_counts;
 mod kemppinen;
 mod occluders;
 mod occlusion;
+mod odd_lights;
 mod orientation;
 mod precise;
 mod settings;
