@@ -8,9 +8,9 @@ use mica_tests::{Gpu, Shot, dpf_cache};
 
 const SIZE: [u32; 2] = [96, 54];
 
-/// An embedded scene as the program shows it by default, and a view of it.
+/// An embedded scene as the program shows it by default, but for the triangles of large ones, and a view of it.
 fn embedded(name: &str, method: &str, occlusion: OcclusionBackend) -> (Renderer, View) {
-    let scene = embedded_scene(name).expect("it is embedded").load().expect("it is sound");
+    let scene = embedded_scene(name).expect("it is embedded").load_coarse().expect("it is sound");
     let view = View::new(scene.default_camera(), SIZE);
     let map = procedural::environment(scene.environment.as_deref().unwrap_or("studio")).expect("it is listed");
     let environment = Environment { map, rotation_radians: 0.0 };

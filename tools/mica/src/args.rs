@@ -33,6 +33,8 @@ pub enum Command {
     Methods(JsonFlag),
     /// Print the plan of a frame: its passes, what they read and write, and what was left out.
     Explain(ExplainArgs),
+    /// Measure how long parts of the renderer take, alone.
+    Bench(BenchArgs),
     /// Measure what methods show against what is true, and lay them side by side.
     Accuracy(AccuracyArgs),
     /// Say whether this machine can render, and what is missing if not.
@@ -181,6 +183,45 @@ pub struct ExplainArgs {
     pub json: bool,
 }
 
+/// `mica bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// What blocks rays: each body that the device offers, on the same rays in the same run. How long it takes to be
+    /// ready, how many bytes it keeps, how many rays a second it answers, and how often the bodies disagree.
+    #[arg(long)]
+    pub occlusion: bool,
+    /// Embedded scenes or .gltf or .glb files. Default: shoe, and drift with its million triangles.
+    #[arg(value_name = "SCENE")]
+    pub scene: Vec<PathBuf>,
+    /// Rays from what the camera sees: into all directions, and as many at most towards the first light.
+    #[arg(long, value_name = "N", default_value_t = 1 << 18, value_parser = clap::value_parser!(u32).range(1..))]
+    pub rays: u32,
+    /// Rounds that are measured, after one that warms up. Each builds everything anew.
+    #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub rounds: u32,
+    /// Rays of the camera: one through each pixel of a picture of this size.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size, allow_hyphen_values = true)]
+    pub size: [u32; 2],
+    /// Writes a line of JSON for each scene and body; `-` is stdout, in place of the table.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// A device, by a part of its name or its number (see `mica doctor`). Default: the best there is.
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub device: Option<String>,
+    /// Most device memory to take, as in `mica render`.
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(16..=1 << 30))]
+    pub memory: Option<u64>,
+    /// Keeps pipelines there. Default: `mica` in the user's cache folder.
+    #[arg(long, value_name = "DIR", conflicts_with = "no_cache")]
+    pub cache: Option<PathBuf>,
+    /// Keeps nothing and uses nothing that was kept.
+    #[arg(long)]
+    pub no_cache: bool,
+    /// Prints neither table nor progress.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
 /// `mica accuracy`.
 #[derive(Debug, Args)]
 pub struct AccuracyArgs {
@@ -188,7 +229,7 @@ pub struct AccuracyArgs {
     /// distribution, from a tenth of a flake in a footprint to 100,000, for three materials.
     #[arg(long)]
     pub counts: bool,
-    /// A contact sheet of all methods on all embedded scenes.
+    /// A contact sheet of all methods on all embedded scenes but the large one.
     #[arg(long, value_name = "FILE.png")]
     pub sheet: Option<PathBuf>,
     /// A folder for what is measured: `counts.jsonl`, a line each row, written as it comes.

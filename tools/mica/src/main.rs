@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod args;
+mod bench;
 mod change;
 mod doctor;
 mod environment_choice;
@@ -52,6 +53,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Scenes(args) => scenes::scenes(args),
         Command::Methods(args) => methods::methods(args),
         Command::Explain(args) => explain::explain(args),
+        Command::Bench(args) => bench::bench(args),
         Command::Accuracy(args) => accuracy::accuracy(args),
         Command::Doctor(args) => doctor::doctor(args),
         Command::Oracle(args) => oracle::oracle(args),

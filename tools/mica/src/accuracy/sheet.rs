@@ -9,7 +9,7 @@ use crate::progress::Progress;
 use crate::session::Session;
 use font8x8::legacy::BASIC_LEGACY;
 use mica_gpu::Timing;
-use mica_render::{EMBEDDED_SCENES, MethodInfo};
+use mica_render::{EMBEDDED_SCENES, EmbeddedScene, MethodInfo};
 use std::path::Path;
 
 /// Pixels between tiles, and around the sheet.
@@ -20,6 +20,11 @@ const PAPER: [u8; 3] = [24, 24, 26];
 const INK: [u8; 3] = [225, 225, 220];
 /// What stands for a tile that could not be rendered.
 const MISSING: [u8; 3] = [70, 30, 30];
+
+/// The scenes of a sheet, from left to right: a tile has no use for a million triangles.
+fn scenes() -> Vec<&'static EmbeddedScene> {
+    EMBEDDED_SCENES.iter().filter(|scene| !scene.is_large()).collect()
+}
 
 /// A sheet to be written.
 pub struct Sheet {
@@ -44,11 +49,11 @@ impl Sheet {
         progress: &mut Progress,
     ) -> Result<(), Failure> {
         let mut canvas = Canvas::new(args.size, methods);
-        let total = (EMBEDDED_SCENES.len() * methods.len()) as u64;
+        let total = (scenes().len() * methods.len()) as u64;
         let mut done = 0;
         let mut failed = None;
         interrupt.defer();
-        'scenes: for (column, scene) in EMBEDDED_SCENES.iter().enumerate() {
+        'scenes: for (column, scene) in scenes().into_iter().enumerate() {
             let mut session = Session::new(&scene_args(args, scene.name), progress)?;
             for (row, method) in methods.iter().enumerate() {
                 if interrupt.requested() {
@@ -125,16 +130,15 @@ impl Canvas {
         let longest = methods.iter().map(|method| method.name.len() as u32).max().unwrap_or(0);
         let margin = longest * CHARACTER + 2 * GAP;
         let heading = CHARACTER + 2 * GAP;
-        let size =
-            [margin + EMBEDDED_SCENES.len() as u32 * (tile[0] + GAP), heading + methods.len() as u32 * (tile[1] + GAP)];
+        let size = [margin + scenes().len() as u32 * (tile[0] + GAP), heading + methods.len() as u32 * (tile[1] + GAP)];
         let pixels = PAPER.repeat((size[0] * size[1]) as usize);
         let mut canvas = Self { size, tile, margin, pixels };
-        for (column, scene) in EMBEDDED_SCENES.iter().enumerate() {
+        for (column, scene) in scenes().into_iter().enumerate() {
             canvas.write(scene.name, [canvas.left(column), GAP]);
         }
         for (row, method) in methods.iter().enumerate() {
             canvas.write(method.name, [GAP, canvas.top(row) + GAP]);
-            for column in 0..EMBEDDED_SCENES.len() {
+            for column in 0..scenes().len() {
                 for y in 0..tile[1] {
                     for x in 0..tile[0] {
                         canvas.set([canvas.left(column) + x, canvas.top(row) + y], MISSING);

@@ -31,11 +31,13 @@ fn every_method_says_what_it_can_be_set_to() {
 fn every_embedded_scene_says_how_it_glints() {
     let report = json(&succeeded(run(&["scenes", "--json"])));
     let scenes = report["scenes"].as_array().expect("a list");
-    for name in ["shoe", "snow", "cloth", "dress", "car", "plane", "sphere"] {
+    for name in ["shoe", "snow", "cloth", "dress", "car", "plane", "sphere", "drift"] {
         let scene = scenes.iter().find(|scene| scene["name"] == name).expect("an embedded scene");
         let glinting = scene["glinting_materials"].as_array().expect("a list");
         assert!(glinting.iter().all(|material| material["count"].as_f64() > Some(0.0)) && !glinting.is_empty());
     }
+    let drift = scenes.iter().find(|scene| scene["name"] == "drift").expect("an embedded scene");
+    assert!(drift["triangles"].as_u64() > Some(1_000_000), "{}", drift["triangles"]);
     assert!(report["environments"].as_array().is_some_and(|names| names.len() >= 2));
     assert!(succeeded(run(&["scenes"])).contains("shoe"));
 }

@@ -1,6 +1,7 @@
 //! The command line as a user meets it: what is printed, what is written, and how it ends.
 
 mod accuracy;
+mod bench;
 mod information;
 mod mistakes;
 mod occlusion;

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
-use super::environment::EquirectMap;
+use crate::scene::EquirectMap;
 
 /// Name and description of every procedural environment.
 pub const NAMES: &[(&str, &str)] = &[

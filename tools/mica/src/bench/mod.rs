@@ -1,0 +1,18 @@
+//! `mica bench`: how long the renderer's parts take, measured alone.
+
+mod body;
+mod occlusion;
+mod rays;
+mod report;
+mod tables;
+
+use crate::args::BenchArgs;
+use crate::error::Failure;
+
+/// Measures what was asked for.
+pub fn bench(args: &BenchArgs) -> Result<(), Failure> {
+    if !args.occlusion {
+        return Err(Failure::bad_input("nothing to do: give --occlusion"));
+    }
+    occlusion::occlusion(args)
+}
