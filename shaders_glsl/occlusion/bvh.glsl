@@ -73,9 +73,9 @@ vec2 bvh_box_span(BvhRay ray, vec3 lower, vec3 upper, float t_min, float t_max) 
 // agree to the bit as long as nothing is contracted; rounding is monotone, so a sign is right or the value is 0, and 0
 // counts for both. That closes the seam without the paper's recourse to doubles.
 //
-// The three functions are off by up to 4 units of rounding of the largest of their products, which moves t by as much of
-// the triangle's depth as that is of its area: little, unless it is a needle. A hit no farther than that is none, since it
-// may as well lie behind the origin, on the very triangle that the ray left.
+// Each function is off by up to 6 units of rounding of its products, which moves t by as much of the corner's depth as that
+// is of the triangle's area: little, unless it is a needle. A hit no farther than that is none, since it may as well lie
+// behind the origin, on the very triangle that the ray left.
 bool bvh_meets(BvhRay ray, BvhTriangle triangle, float t_min, inout RayHit hit) {
   vec3 a = bvh_turned(triangle.a - ray.origin, ray.axis);
   vec3 b = bvh_turned(triangle.b - ray.origin, ray.axis);
@@ -88,9 +88,12 @@ bool bvh_meets(BvhRay ray, BvhTriangle triangle, float t_min, inout RayHit hit) 
   precise float w = b_sheared.x * a_sheared.y - b_sheared.y * a_sheared.x;
   precise float doubled_area = u + v + w;
   precise float t = (u * a.z + v * b.z + w * c.z) * ray.shear.z / doubled_area;
-  vec2 size = max(max(abs(a_sheared), abs(b_sheared)), abs(c_sheared));
-  float depth = max(max(abs(a.z), abs(b.z)), abs(c.z));
-  float t_error = 5e-7 * size.x * size.y * depth * abs(ray.shear.z / doubled_area);
+  vec3 sizes = vec3(
+    dot(abs(c_sheared), abs(b_sheared.yx)),
+    dot(abs(a_sheared), abs(c_sheared.yx)),
+    dot(abs(b_sheared), abs(a_sheared.yx))
+  );
+  float t_error = 3.5e-7 * dot(sizes, abs(vec3(a.z, b.z, c.z))) * abs(ray.shear.z / doubled_area);
   bool inside = min(u, min(v, w)) >= 0.0 || max(u, max(v, w)) <= 0.0;
   // Seen edge-on, the area is 0 and so is every edge function.
   if (!inside || doubled_area == 0.0 || !(t > max(t_min, t_error) && t < hit.t)) {
