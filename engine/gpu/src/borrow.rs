@@ -109,6 +109,9 @@ pub struct HostImage {
 }
 
 /// A host's buffer for one of the graph's. How it arrives need not be said: a frame waits for all commands before it.
+///
+/// What acceleration structures are built from needs the usages SHADER_DEVICE_ADDRESS and
+/// ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR, and memory allocated with DEVICE_ADDRESS.
 #[derive(Clone, Copy, Debug)]
 pub struct HostBuffer {
     /// The buffer, at least as large as the graph's handle says, with usages for all that the graph does with it.

@@ -48,7 +48,7 @@ pub struct Executor {
     submission: Option<Submission>,
     pipelines: Pipelines,
     slots: Vec<Slot>,
-    resources: Resources,
+    pub(crate) resources: Resources,
     options: ExecutorOptions,
     next_frame: u64,
     device: Arc<Device>,
@@ -238,7 +238,8 @@ impl Executor {
         let objects = self.resources.resolve(&plan, frame, self.oldest_unfinished())?;
         let (device, slot) = (&self.device, &mut self.slots[index]);
         let pool = slot.ready_descriptors(device, &plan)?;
-        let prepared = prepare(device, &mut self.pipelines, pool, &plan, &objects)?;
+        let was_built = |id| self.resources.is_built(id);
+        let prepared = prepare(device, &mut self.pipelines, pool, &plan, &objects, &was_built)?;
         slot.ready_staging(&mut self.resources.memory, device, prepared.staging_bytes as u64)?;
         let count = timestamp_count(timing, plan.passes.len());
         let measures = device.info.limits.timestamp_valid_bits > 0;
@@ -266,6 +267,7 @@ impl Executor {
         unsafe { recording.record() };
         slot.frame = Some(frame);
         self.next_frame += 1;
+        self.resources.note_builds(&plan);
         Ok(Recorded { slot: index, plan, timing, downloads })
     }
 

@@ -117,7 +117,8 @@ impl Memory {
         let device = self.device.clone();
         let object = create_buffer_for(&device, what, desc, usage)?;
         // SAFETY: the buffer is alive.
-        let requirements = unsafe { device.raw.get_buffer_memory_requirements(object.buffer) };
+        let mut requirements = unsafe { device.raw.get_buffer_memory_requirements(object.buffer) };
+        requirements.alignment = requirements.alignment.max(structures::INSTANCE_ALIGNMENT);
         let allocation = self.allocate(what, requirements, location, true);
         let bound = allocation.and_then(|allocation| {
             let bound = bind_buffer(&device, what, object.buffer, &allocation, 0);

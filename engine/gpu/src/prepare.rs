@@ -15,7 +15,7 @@ use mica_graph::{
     Access, Description, Download, Draw, Extent, MeshRange, Pass, Plan, ResourceId, Shader, Slot, Stage, StructureDesc,
     StructureInstance, Use, Work,
 };
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::ops::Range;
 
 /// What a pass does, in handles.
@@ -107,21 +107,26 @@ pub(crate) const MARKER_BYTES: usize = 16;
 /// Offsets in staging memory suit every format: the largest texel has 16 bytes.
 const STAGING_ALIGNMENT: usize = 16;
 
-/// Prepares all passes.
+/// Prepares all passes. `was_built` knows the structures that frames before have built.
 pub(crate) fn prepare<'a>(
     device: &Device,
     pipelines: &mut Pipelines,
     pool: vk::DescriptorPool,
     plan: &'a Plan,
     objects: &HashMap<ResourceId, Object>,
+    was_built: &dyn Fn(ResourceId) -> bool,
 ) -> Result<Prepared<'a>, Error> {
+    let mut built = HashSet::new();
     let commands = Vec::with_capacity(plan.passes.len());
     let mut prepared = Prepared { commands, staging_bytes: MARKER_BYTES, size_queries: 0 };
     for pass in &plan.passes {
         let (staging, size_queries) = (&mut prepared.staging_bytes, &mut prepared.size_queries);
-        let mut context = Preparation { device, pipelines, pool, pass, objects, staging, size_queries };
+        let is_built = &|id| built.contains(&id) || was_built(id);
+        let mut context = Preparation { device, pipelines, pool, pass, objects, is_built, staging, size_queries };
         let command = context.command()?;
         prepared.commands.push(command);
+        let written = pass.uses.iter().filter(|used| used.access == Access::BuildWrite);
+        built.extend(written.map(|used| used.resource.id));
     }
     Ok(prepared)
 }
@@ -133,6 +138,8 @@ pub(crate) struct Preparation<'a, 'b> {
     pub(crate) pool: vk::DescriptorPool,
     pub(crate) pass: &'a Pass,
     objects: &'b HashMap<ResourceId, Object>,
+    /// Whether a frame or a pass before has built a structure.
+    is_built: &'b dyn Fn(ResourceId) -> bool,
     staging: &'b mut usize,
     size_queries: &'b mut u32,
 }
@@ -257,9 +264,7 @@ impl<'a> Preparation<'a, '_> {
             Some(Object::Structure(structure)) => Some(structure.address),
             _ => None,
         };
-        let Some(records) = structures::instance_records(instances, address) else {
-            return Err(self.bad_pass("an instance has no bottom level, or an index of more than 24 bits".to_owned()));
-        };
+        let records = structures::instance_records(instances, address).map_err(|why| self.bad_pass(why))?;
         let build = Build::over_instances(self.device, count, &self.structure(to)?, self.buffer(scratch)?);
         let bytes = self.stage_bytes(to, records.len() as u64)?;
         Ok(Command::BuildInstances { build, records, bytes })
@@ -267,6 +272,9 @@ impl<'a> Preparation<'a, '_> {
 
     /// Whether the resource was made for its use.
     fn check_use(&self, used: &Use) -> Result<(), Error> {
+        if let Description::Structure(desc) = &used.resource.description {
+            self.check_structure(used, desc)?;
+        }
         let buffers_only = matches!(
             used.access,
             Access::Uniform | Access::IndirectRead | Access::BuildRead | Access::BuildWrite | Access::Traverse
@@ -284,6 +292,21 @@ impl<'a> Preparation<'a, '_> {
             Object::Image(image) if !image.usage.contains(to_vk::image_usage(&BTreeSet::from([used.access]))) => {
                 let why = format!("this device has no {:?} images for {:?}", image.desc.format, used.access);
                 Err(self.bad_use(used, &why))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether a structure that is read has been built, and is of the level that is wanted.
+    fn check_structure(&self, used: &Use, desc: &StructureDesc) -> Result<(), Error> {
+        let is_top = matches!(desc, StructureDesc::Instances { .. });
+        match used.access {
+            Access::Traverse if !is_top => {
+                Err(self.bad_use(used, "rays are asked of a top level, and it is a bottom level"))
+            }
+            Access::BuildRead if is_top => Err(self.bad_use(used, "it is a top level")),
+            access if access.reads() && !(self.is_built)(used.resource.id) => {
+                Err(self.bad_use(used, "nothing has built it"))
             }
             _ => Ok(()),
         }

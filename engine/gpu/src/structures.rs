@@ -52,6 +52,8 @@ pub(crate) const VERTEX_BYTES: u64 = 12;
 pub(crate) const INDEX_BYTES: u64 = 4;
 /// Bytes of an instance as the device reads it.
 const INSTANCE_BYTES: usize = size_of::<vk::AccelerationStructureInstanceKHR>();
+/// What the address of instances is a multiple of.
+pub(crate) const INSTANCE_ALIGNMENT: u64 = 16;
 /// Bits of an instance's custom index.
 const INDEX_BITS: u32 = 24;
 
@@ -191,20 +193,26 @@ pub(crate) unsafe fn destroy(device: &Device, structure: &StructureObject) {
 /// The address of a buffer.
 pub(crate) fn address(device: &Device, buffer: vk::Buffer) -> vk::DeviceAddress {
     let info = vk::BufferDeviceAddressInfo::default().buffer(buffer);
-    // SAFETY: a device with structures has the feature, and gives every buffer of ours the usage.
+    // SAFETY: a device with structures has the feature, every buffer of ours the usage, and hosts promise it of theirs.
     unsafe { device.raw.get_buffer_device_address(&info) }
 }
 
-/// Instances as the device reads them; `None` where one's index takes more bits than there are.
+/// Instances as the device reads them, or what is wrong with one.
 pub(crate) fn instance_records(
     instances: &[StructureInstance],
     address: impl Fn(&StructureInstance) -> Option<vk::DeviceAddress>,
-) -> Option<Vec<u8>> {
-    let mut bytes = Vec::with_capacity(instances.len() * INSTANCE_BYTES);
-    for instance in instances {
+) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::with_capacity(instances.len().max(1) * INSTANCE_BYTES);
+    for (place, instance) in instances.iter().enumerate() {
         if instance.index >> INDEX_BITS != 0 {
-            return None;
+            return Err(format!("instance {place} has index {}, which takes more than 24 bits", instance.index));
         }
+        if !has_inverse(&instance.scene_from_local) {
+            return Err(format!("instance {place} has a transform without an inverse"));
+        }
+        let Some(address) = address(instance) else {
+            return Err(format!("instance {place} places a structure that the pass does not use"));
+        };
         for row in instance.scene_from_local {
             bytes.extend(row.iter().flat_map(|value| value.to_ne_bytes()));
         }
@@ -212,9 +220,18 @@ pub(crate) fn instance_records(
         let flags = vk::GeometryInstanceFlagsKHR::TRIANGLE_FACING_CULL_DISABLE.as_raw();
         bytes.extend((instance.index | 0xff << INDEX_BITS).to_ne_bytes());
         bytes.extend((flags << INDEX_BITS).to_ne_bytes());
-        bytes.extend(address(instance)?.to_ne_bytes());
+        bytes.extend(address.to_ne_bytes());
     }
-    Some(bytes)
+    // The build reads none where there are none, but wants an address all the same.
+    bytes.resize(bytes.len().max(INSTANCE_BYTES), 0);
+    Ok(bytes)
+}
+
+/// Whether the three columns are finite and independent. In f64, where the products of no f32 come to nothing.
+fn has_inverse(rows: &[[f32; 4]; 3]) -> bool {
+    let [[a, b, c, _], [d, e, f, _], [g, h, i, _]] = rows.map(|row| row.map(f64::from));
+    let determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g);
+    rows.iter().flatten().all(|value| value.is_finite()) && determinant != 0.0
 }
 
 /// A build, ready to be recorded.

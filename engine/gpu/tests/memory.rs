@@ -24,6 +24,25 @@ fn bytes_named(executor: &Executor, name: &str) -> u64 {
 }
 
 #[test]
+fn what_one_large_frame_shared_is_given_back_by_the_next() {
+    let checked = Checked::new();
+    let mut executor = checked.executor();
+    let mut shared_by = |bytes: u64| {
+        let mut graph = Graph::new();
+        let mut large = graph.buffer("large", bytes);
+        graph.fill(&mut large, 1);
+        graph.download(&large);
+        executor.run(graph, Timing::Overlapped).expect("the frame runs");
+        bytes_named(&executor, "frame (shared)")
+    };
+    assert!(shared_by(48 * MIB) >= 48 * MIB);
+    assert!(shared_by(16 * MIB) >= 48 * MIB, "a frame of a third of it keeps it");
+    assert!(shared_by(MIB) < 2 * MIB);
+    assert!(shared_by(8 * MIB) < 9 * MIB);
+    assert!(shared_by(MIB) >= 8 * MIB, "so little is kept in any case");
+}
+
+#[test]
 fn content_outlives_the_frame_and_memory_goes_with_the_last_handle() {
     let checked = Checked::new();
     let mut executor = checked.executor();

@@ -183,6 +183,78 @@ fn a_compacted_structure_answers_alike_and_the_original_is_given_back() {
     });
 }
 
+/// Frees whatever nobody holds, and says what is left of the structures.
+fn structures_left(executor: &mut Executor) -> Vec<String> {
+    executor.collect();
+    let rows = executor.memory().into_iter().map(|row| row.name);
+    rows.filter(|name| ["low", "high", "world"].contains(&name.as_str())).collect()
+}
+
+#[test]
+fn a_top_level_holds_on_to_what_it_places_until_it_goes_itself() {
+    tracing(|executor| {
+        let mut g = Graph::new();
+        let squares = Squares::build(&mut g, true);
+        let world = build_world(&mut g, &squares.meshes[0], &squares.meshes[1]);
+        executor.run(g, Timing::Overlapped).expect("the frame runs");
+        drop(squares);
+        assert_eq!(structures_left(executor), ["high", "low", "world"]);
+        let mut g = Graph::new();
+        let buffer = ask(&mut g, &world);
+        assert_eq!(answers(executor, g, &buffer), expected());
+        drop(world);
+        assert!(structures_left(executor).is_empty());
+    });
+}
+
+#[test]
+fn a_frame_under_way_keeps_what_its_top_level_places() {
+    let offered = Checked::new().with_ray_query().is_some();
+    let features = [Feature::BufferDeviceAddress, Feature::AccelerationStructure, Feature::RayQuery];
+    if !offered {
+        // What is refused there, `tracing` asserts in the tests above.
+        return;
+    }
+    let host = Host::enabling(&features);
+    let mut executor = Executor::new(host.lend()).expect("an executor");
+    let run = |executor: &mut Executor, g: Graph| {
+        let commands = host.begin();
+        // SAFETY: the command buffer was just begun, and is submitted and waited for below.
+        let recorded = unsafe { executor.record(g, commands, Timing::Overlapped) }.expect("the frame is recorded");
+        host.end_and_submit(commands);
+        recorded
+    };
+    let mut g = Graph::new();
+    let squares = Squares::build(&mut g, true);
+    let world = build_world(&mut g, &squares.meshes[0], &squares.meshes[1]);
+    let recorded = run(&mut executor, g);
+    // SAFETY: the host waited for the frame.
+    unsafe { executor.finish(recorded) }.expect("the frame is finished");
+
+    let mut g = Graph::new();
+    let buffer = ask(&mut g, &world);
+    g.download(&buffer);
+    // As far as the executor knows, this one is under way until it is finished.
+    let asking = run(&mut executor, g);
+    let Squares { meshes: [low, high], .. } = squares;
+    drop(low);
+    // The next frame builds the top level over less.
+    let mut g = Graph::new();
+    let places = [5, 6, 7].map(|index| (&high, placed_at(0.0, 0.0), index));
+    let mut world = world;
+    g.build_instances("build world", places, &mut world);
+    let building = run(&mut executor, g);
+    assert_eq!(structures_left(&mut executor), ["high", "low", "world"]);
+    // SAFETY: the host waited for the frame.
+    unsafe { executor.finish(asking) }.expect("the frame is finished");
+    // The frame that builds it anew began with all that it held.
+    drop((high, world));
+    assert_eq!(structures_left(&mut executor), ["high", "low", "world"]);
+    // SAFETY: the host waited for the frame.
+    unsafe { executor.finish(building) }.expect("the frame is finished");
+    assert!(structures_left(&mut executor).is_empty());
+}
+
 /// Before the size is known, a compacted structure is as large as the original, and no less right.
 #[test]
 fn structures_are_built_compacted_and_asked_in_one_frame() {
@@ -282,6 +354,27 @@ fn what_cannot_be_built_is_refused_and_nothing_is_recorded() {
             let mesh = build(g, mesh(1, 4, Lifetime::Scene), range(0, 0));
             let mut world = Structure::over_instances("world", 1, Lifetime::Scene);
             g.build_instances("build world", [(&mesh, MOVE_UP, 1 << 24)], &mut world);
+        });
+        for singular in [[[0.0; 4]; 3], [[f32::NAN; 4]; 3], [MOVE_UP[0], MOVE_UP[0], MOVE_UP[2]]] {
+            refused(executor, "without an inverse", &|g| {
+                let mesh = build(g, mesh(1, 4, Lifetime::Scene), range(0, 0));
+                let mut world = Structure::over_instances("world", 1, Lifetime::Scene);
+                g.build_instances("build world", [(&mesh, singular, 0)], &mut world);
+            });
+        }
+        refused(executor, "nothing has built it", &|g| {
+            let unbuilt = mesh(1, 4, Lifetime::Scene);
+            let mut small = Structure::compacted(&unbuilt).expect("a bottom level");
+            g.compact(&unbuilt, &mut small);
+        });
+        refused(executor, "nothing has built it", &|g| {
+            let mut world = Structure::over_instances("world", 1, Lifetime::Scene);
+            g.build_instances("build world", [(&mesh(1, 4, Lifetime::Scene), MOVE_UP, 0)], &mut world);
+        });
+        refused(executor, "it is a bottom level", &|g| {
+            let mesh = build(g, mesh(1, 4, Lifetime::Scene), range(0, 0));
+            let answers = ask(g, &mesh);
+            g.download(&answers);
         });
         refused(executor, "does not suit", &|g| {
             let mut buffer = Buffer::new("no structure", 64, Lifetime::Scene);

@@ -202,11 +202,12 @@ impl Graph {
     /// Copies `data` into `buffer` from byte `offset` on, and leaves the rest of it as it is.
     ///
     /// # Panics
-    /// If there is no such part of the buffer: a mistake of the pass's author, not of any input.
+    /// If there is no such part of the buffer, or no data: a mistake of the pass's author, not of any input.
     pub fn update(&mut self, buffer: &mut Buffer, offset: u64, data: impl Into<Arc<[u8]>>) {
         let (resource, data) = (&buffer.resource, data.into());
         let end = offset.saturating_add(data.len() as u64);
-        assert!(end <= buffer.desc.bytes, "update of {}: it has no bytes {offset}..{end}", resource.name);
+        let is_part = offset < end && end <= buffer.desc.bytes;
+        assert!(is_part, "update of {}: it has no bytes {offset}..{end}", resource.name);
         let uses = vec![transfer(resource, Access::TransferUpdate)];
         self.push(format!("update {}", resource.name), Work::Update { data, offset }, uses);
     }

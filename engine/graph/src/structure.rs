@@ -114,6 +114,9 @@ pub struct StructureInstance {
 impl Graph {
     /// Builds bottom levels over meshes that lie in two buffers, in one pass, so that a device may build them side by
     /// side. Each gets working space of its own for the pass.
+    ///
+    /// An index of a mesh is below its [`TrianglesDesc::vertices`]: nothing checks what is in the buffers, and what a device
+    /// does with an index beyond is not defined.
     pub fn build_meshes<'a>(
         &mut self,
         name: impl Into<String>,
@@ -130,10 +133,11 @@ impl Graph {
         self.push(name, Work::BuildMeshes { meshes: ranges.into() }, uses);
     }
 
-    /// Builds a top level over placements of bottom levels, as many as it was made for.
+    /// Builds a top level over placements of bottom levels, as many as it was made for. It holds on to them until it is
+    /// built again or dropped, so their handles may go before it.
     ///
     /// # Panics
-    /// If there are more or fewer: a mistake of the pass's author, not of any input.
+    /// If there are more or fewer, or one is no bottom level: a mistake of the pass's author, not of any input.
     pub fn build_instances<'a>(
         &mut self,
         name: impl Into<String>,
@@ -144,6 +148,8 @@ impl Graph {
         let mut seen = BTreeSet::new();
         let mut placed = Vec::new();
         for (bottom, scene_from_local, index) in instances {
+            let is_bottom = !matches!(bottom.desc, StructureDesc::Instances { .. });
+            assert!(is_bottom, "build of {}: {} is no bottom level", structure.resource.name, bottom.resource.name);
             if seen.insert(bottom.resource.id) {
                 uses.push(build(&bottom.resource, Access::BuildRead));
             }

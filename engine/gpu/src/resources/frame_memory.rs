@@ -12,6 +12,9 @@ use gpu_allocator::vulkan::Allocation;
 use mica_graph::{Access, BufferDesc, Description, Placement, Usage};
 use std::collections::BTreeSet;
 
+/// Shared memory of so many bytes is kept however little of it a frame needs.
+const KEPT_BYTES: u64 = 32 << 20;
+
 /// The memory of the frames' own resources, and the objects that the last plan placed in it.
 pub(super) struct Shared {
     pub(super) allocation: Allocation,
@@ -91,8 +94,11 @@ impl Resources {
         placed: &[(&Usage, Placement)],
         oldest_unfinished: u64,
     ) -> Result<(), Error> {
+        // What a build once needed is given back, as a frame without it needs far less.
+        let is_wasteful = |size: u64| size > KEPT_BYTES && size / 4 > bytes;
         let fits = |shared: &Shared| {
             shared.allocation.size() >= bytes
+                && !is_wasteful(shared.allocation.size())
                 && shared.alignment >= alignment
                 && shared.memory_type_bits & memory_type_bits == shared.memory_type_bits
         };
