@@ -93,7 +93,7 @@ bool bvh_meets(BvhRay ray, BvhTriangle triangle, float t_min, inout RayHit hit) 
     dot(abs(a_sheared), abs(c_sheared.yx)),
     dot(abs(b_sheared), abs(a_sheared.yx))
   );
-  float t_error = 3.5e-7 * dot(sizes, abs(vec3(a.z, b.z, c.z))) * abs(ray.shear.z / doubled_area);
+  float t_error = 3.5e-7 * dot(sizes, abs(vec3(a.z, b.z, c.z))) * abs(ray.shear.z) / abs(doubled_area);
   bool inside = min(u, min(v, w)) >= 0.0 || max(u, max(v, w)) <= 0.0;
   // Seen edge-on, the area is 0 and so is every edge function.
   if (!inside || doubled_area == 0.0 || !(t > max(t_min, t_error) && t < hit.t)) {

@@ -13,12 +13,9 @@ const uint RAY_FLAGS = gl_RayFlagsOpaqueEXT;
 
 layout(binding = 20) uniform accelerationStructureEXT scene_structure; // Its custom index is the instance.
 
-// Vulkan counts a hit at t_min, and ours begin behind it.
-const float RAY_QUERY_LEAST_T = 1e-30;
-
-// Runs a query to its end. Only masked triangles are candidates: all others are taken by the device itself.
+// Runs a query to its end. Vulkan counts hits strictly between t_min and t_max, as we do. Only masked triangles are candidates: all others are taken by the device itself.
 void ray_query_run(rayQueryEXT query, uint flags, vec3 origin, vec3 direction, float t_min, float t_max) {
-  rayQueryInitializeEXT(query, scene_structure, flags, 0xffu, origin, max(t_min, RAY_QUERY_LEAST_T), direction, t_max);
+  rayQueryInitializeEXT(query, scene_structure, flags, 0xffu, origin, t_min, direction, t_max);
   while (rayQueryProceedEXT(query)) {
 #ifdef ALPHA_MASKS
     uint instance = rayQueryGetIntersectionInstanceCustomIndexEXT(query, false);

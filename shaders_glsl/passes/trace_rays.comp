@@ -34,7 +34,8 @@ layout(std430, binding = 30) readonly buffer Rays { Ray rays[]; };
 layout(std430, binding = 40) writeonly buffer RayAnswers { RayAnswer answers[]; };
 
 void main() {
-  uint index = gl_GlobalInvocationID.x;
+  // Rows of a dispatch, each as long as Vulkan grants every device. No buffer holds 2^32 rays.
+  uint index = gl_GlobalInvocationID.y * gl_NumWorkGroups.x * gl_WorkGroupSize.x + gl_GlobalInvocationID.x;
   if (index < params.count) {
     Ray ray = rays[index];
     vec3 origin =

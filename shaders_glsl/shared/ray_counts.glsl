@@ -4,8 +4,8 @@
 #include "shared/rays.glsl"
 
 layout(std430, binding = 27) buffer RayCounts {
-  uint traced; // Rays.
-  uint cut_short; // Those of them that ran out of steps.
+  uint traced; // Rays; 2^32 - 1 stands for that many or more.
+  uint cut_short; // Those of them that ran out of steps, counted alike.
 } ray_counts;
 
 shared uint group_traced;
@@ -23,8 +23,13 @@ void count_rays() {
   atomicAdd(group_cut_short, rays_cut_short);
   barrier();
   if (gl_LocalInvocationIndex == 0u) {
-    atomicAdd(ray_counts.traced, group_traced);
-    atomicAdd(ray_counts.cut_short, group_cut_short);
+    // 32 lights on the largest of images pass 2^32. Whoever carries the count past its end leaves it there.
+    if (atomicAdd(ray_counts.traced, group_traced) > ~group_traced) {
+      atomicMax(ray_counts.traced, 0xffffffffu);
+    }
+    if (atomicAdd(ray_counts.cut_short, group_cut_short) > ~group_cut_short) {
+      atomicMax(ray_counts.cut_short, 0xffffffffu);
+    }
   }
 }
 

@@ -3,7 +3,7 @@
 use crate::Picture;
 use mica_gpu::{Device, DeviceOptions, Executor, Messages, Timing};
 use mica_graph::{Buffer, Graph};
-use mica_render::{Cache, LeftOut, OcclusionBackend, Renderer, View};
+use mica_render::{Cache, LeftOut, OcclusionBackend, Question, Ray, RayAnswer, RayCounts, Renderer, View};
 use std::sync::{Arc, LazyLock};
 
 /// A device of our own with validation and synchronisation validation on, and an executor on it. Dropping it fails the
@@ -96,6 +96,17 @@ impl Gpu {
         let mut run = self.executor().run(graph, Timing::Overlapped).expect("the frame runs");
         let picture = Picture::from_bytes(view.size, &run.take(download));
         Shot { picture, updates, draws, resources, left_out: frame.left_out }
+    }
+
+    /// Asks a renderer about rays.
+    pub fn trace(&mut self, renderer: &mut Renderer, rays: &[Ray], question: Question) -> (Vec<RayAnswer>, RayCounts) {
+        let mut graph = Graph::new();
+        let mut asked = graph.buffer("rays", size_of_val(rays) as u64);
+        graph.upload(&mut asked, bytemuck::cast_slice::<_, u8>(rays));
+        let mut answers = graph.buffer("answers", (rays.len() * size_of::<RayAnswer>()) as u64);
+        let counts = renderer.trace(&mut graph, &asked, rays.len() as u32, question, &mut answers).expect("declared");
+        let read = self.run(graph, &[&answers, &counts]);
+        (bytemuck::pod_collect_to_vec(&read[0]), bytemuck::pod_read_unaligned(&read[1]))
     }
 
     /// Runs a graph of the test's own and returns the bytes of the buffers named.

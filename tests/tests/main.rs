@@ -20,6 +20,7 @@ mod occlusion;
 mod odd_lights;
 mod orientation;
 mod precise;
+mod rays;
 mod settings;
 mod shopf;
 mod smooth;

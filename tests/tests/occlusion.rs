@@ -3,9 +3,10 @@
 
 use glam::DVec3;
 use mica_graph::{Graph, Shader};
-use mica_render::scene::{EquirectMap, Glint, Instance, Light, Material, Scene};
+use mica_render::scene::{Camera, EquirectMap, Glint, Instance, Light, Material, Scene};
 use mica_render::{Environment, METHODS, OcclusionBackend, Renderer, View, embedded_scene};
 use mica_tests::shapes::{OVER_PLANE, conductor, plane, seen_plane};
+use mica_tests::triangles::{Triangles, decided};
 use mica_tests::{Gpu, Picture};
 
 const SIZE: [u32; 2] = [112, 63];
@@ -135,8 +136,95 @@ fn glints_vanish_where_their_mirror_direction_is_occluded() {
     }
 }
 
+/// The triangle that a camera sees through a point of the picture, and which lights arrive there, in f64; nothing where
+/// nothing is seen.
+fn lit_by(
+    triangles: &Triangles,
+    lights: &[Light],
+    camera: &Camera,
+    size: [u32; 2],
+    [x, y]: [f64; 2],
+) -> Option<(usize, usize, Vec<bool>)> {
+    let half_height = (0.5 * camera.vertical_fov_radians).tan();
+    let [width, height] = size.map(f64::from);
+    let half_width = half_height * width / height;
+    let local = DVec3::new((2.0 * x / width - 1.0) * half_width, (1.0 - 2.0 * y / height) * half_height, -1.0);
+    let direction = camera.world_from_camera.transform_vector3(local);
+    let seen = triangles.first_met(camera.eye(), direction)?;
+    let point = camera.eye() + seen.t * direction;
+    let arrives = |light: &Light| {
+        let (towards, end) = match *light {
+            Light::Directional { direction, .. } => (-direction, f64::INFINITY),
+            Light::Point { position, .. } | Light::Spot { position, .. } => (position - point, 1.0),
+        };
+        // As far from the surface as `shared/ray_offset.glsl` begins, or about that.
+        let origin = point + 1e-5 * (point - camera.eye()).length() * seen.normal;
+        seen.normal.dot(towards) > 0.0 && triangles.met(origin, towards, 0.0).all(|met| met.t >= end)
+    };
+    Some((seen.instance, seen.triangle, lights.iter().map(arrives).collect()))
+}
+
+/// What says of a pixel that it is a tie says so nowhere but on a shadow's edge, and elsewhere what arrives.
+#[test]
+fn only_where_a_shadow_ends_is_a_pixel_a_tie() {
+    let scene = under_a_roof("smooth", 0.0);
+    let triangles = Triangles::of(&scene);
+    let sun = Light::Directional { direction: DVec3::NEG_Y, irradiance: [1.0; 3] };
+    let camera = OVER_PLANE.view(SIZE).camera;
+    let [mut lit, mut dark] = [0; 2];
+    for (pixel, (point, _)) in seen_plane(SIZE).into_iter().enumerate() {
+        let at = [pixel as u32 % SIZE[0], pixel as u32 / SIZE[0]];
+        let sure = decided(at, |point| lit_by(&triangles, &[sun], &camera, SIZE, point).map(|(.., lit)| lit));
+        match (sure.flatten(), meets_roof(point, DVec3::Y)) {
+            (None, expected) => assert_eq!(expected, None, "{point} is not on an edge"),
+            (Some(arrives), Some(hidden)) => {
+                assert_eq!(arrives, [!hidden], "{point}");
+                *(if hidden { &mut dark } else { &mut lit }) += 1;
+            }
+            (Some(_), None) => {}
+        }
+    }
+    assert!(lit > 3000 && dark > 100, "{lit} lit, {dark} dark");
+}
+
+/// Both bodies, at the size that users meet: over a million triangles.
+#[test]
+fn the_large_scene_has_the_same_shadows_by_both_bodies() {
+    const SIZE: [u32; 2] = [96, 54];
+    let mut gpu = Gpu::new();
+    let scene = embedded_scene("drift").expect("it is embedded").load().expect("it is sound");
+    assert!(scene.triangle_count() > 1_000_000);
+    let view = View::new(scene.default_camera(), SIZE);
+    let sun = Light::Directional { direction: DVec3::new(-0.9, -0.15, -0.3).normalize(), irradiance: [3.0, 0.0, 0.0] };
+    let bodies = gpu.occlusion_bodies();
+    let mut shown = |body| {
+        let mut scene = scene.clone();
+        scene.lights.clear();
+        let mut renderer = Renderer::new(scene, &[sun], None, body).expect("the scene is sound");
+        renderer.set_method(None, "smooth").expect("the method exists");
+        gpu.render(&mut renderer, &view).picture
+    };
+    let open = shown(OcclusionBackend::None);
+    let pictures: Vec<Picture> = bodies.into_iter().map(&mut shown).collect();
+    for picture in &pictures {
+        // Of the surfaces that face the sun.
+        let facing: Vec<usize> = (0..open.pixels.len()).filter(|pixel| open.pixels[*pixel][0] > 0.0).collect();
+        let lit = facing.iter().filter(|pixel| picture.pixels[**pixel][0] == open.pixels[**pixel][0]).count();
+        let dark = facing.iter().filter(|pixel| picture.pixels[**pixel][0] == 0.0).count();
+        println!(
+            "{} face the sun, {lit} lit, {dark} in shadow; {:?} differ",
+            facing.len(),
+            pictures[0].differing(picture)
+        );
+        assert_eq!(lit + dark, facing.len());
+        assert!(20 * dark > facing.len() && 5 * lit > facing.len(), "{lit} lit, {dark} in shadow");
+        assert!(pictures[0].differing(picture).len() <= 1, "{:?}", pictures[0].differing(picture));
+    }
+}
+
 /// Ray queries and the BVH render the same picture of a scene, but for ties: rays that pass an edge by less than
-/// rounding. Of the 20,736 pixels of each scene, with a ray to either light, two may be such.
+/// rounding, and where f64 sees one thing a 64th of a pixel to one side and another to the other. Of the 20,736 pixels
+/// of each scene, with a ray to either light, two may be such.
 #[test]
 fn pictures_of_both_bodies_differ_only_at_ties() {
     const SIZE: [u32; 2] = [192, 108];
@@ -168,6 +256,14 @@ fn pictures_of_both_bodies_differ_only_at_ties() {
             let differing = bvh.differing(other);
             println!("{name}: {} of {} pixels differ", differing.len(), bvh.pixels.len());
             assert!(differing.len() <= 2, "{name}: {differing:?}");
+            if !differing.is_empty() {
+                let triangles = Triangles::of(&scene);
+                for pixel in differing {
+                    let at = [pixel as u32 % SIZE[0], pixel as u32 / SIZE[0]];
+                    let sure = decided(at, |point| lit_by(&triangles, &lights, &camera, SIZE, point));
+                    assert_eq!(sure, None, "{name}: pixel {at:?} is no tie");
+                }
+            }
         }
     }
     println!("compared: {:?}", bodies.iter().map(|body| body.name()).collect::<Vec<_>>());

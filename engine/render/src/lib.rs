@@ -21,6 +21,8 @@ pub use embedded::{EMBEDDED_SCENES, EmbeddedScene, embedded_scene};
 pub use methods::{
     COMMON_SETTINGS, Claim, DEFAULT_METHOD, GlintMaterial, JakobTable, METHODS, MethodInfo, Rung, method,
 };
+/// What [`Renderer::trace`] reads and writes.
+pub use mica_shaders::types::{Ray, RayAnswer, RayCounts};
 pub use occluders::{OcclusionBackend, RaysOfPass};
 pub use passes::trace::Question;
 pub use renderer::{Environment, Frame, LeftOut, Progress, Renderer, Update};

@@ -9,7 +9,7 @@ use crate::settings::{SettingError, Value};
 use crate::{Cache, DEFAULT_METHOD, GlintMaterial, OcclusionBackend, Question, RaysOfPass, RenderError, View, passes};
 use glam::{DAffine3, DVec3};
 use mica_gpu::Executor;
-use mica_graph::{Buffer, Extent, Format, Graph, Image, ImageDesc, Lifetime};
+use mica_graph::{Buffer, Extent, Format, Graph, Image, ImageDesc, Lifetime, Pass, ResourceId};
 use mica_shaders::{constants as c, types};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -69,8 +69,10 @@ pub struct Renderer {
     occlusion: OcclusionBackend,
     /// Present once something asks, unless occlusion is off.
     occluders: Option<Occluders>,
-    /// Frames declared so far.
-    frames: u64,
+    /// Graphs that the scene was brought up to date in.
+    graphs: u64,
+    /// Something in the last of them, and in no other.
+    newest: Option<ResourceId>,
     materials: Vec<GlintMaterial>,
     methods: BTreeMap<&'static str, Box<dyn Method>>,
     /// Stands for the shadow mask where there are no lights: shaders bind it but do not read it.
@@ -108,7 +110,8 @@ impl Renderer {
             rotation_radians: environment.map_or(0.0, |environment| environment.rotation_radians),
             occlusion,
             occluders: None,
-            frames: 0,
+            graphs: 0,
+            newest: None,
             materials,
             methods: BTreeMap::new(),
             no_lights: Image::new("no_lights", one, Lifetime::Scene),
@@ -136,7 +139,10 @@ impl Renderer {
         self.buffers.center
     }
 
-    /// Moves an instance. The next frame updates what depends on it, and nothing else.
+    /// Moves an instance. The next frame updates what depends on it, and nothing else: a few bytes and the levels above the
+    /// instances. Where f32 would lose an instance in its own space (one flattened, or badly skewed), its triangles are stored
+    /// in scene space: to move it builds those anew, and with [`OcclusionBackend::Bvh`] uploads all of the hierarchy. Where the
+    /// move itself changes how instances are stored, that body also builds over every mesh again, unless it did so before.
     ///
     /// # Errors
     /// [`RenderError::NoSuchInstance`] and [`RenderError::BadPlacement`]; nothing is changed then.
@@ -273,7 +279,6 @@ impl Renderer {
 
         let first_update = g.passes().len();
         self.update_scene(g, lit || mirror_occlusion)?;
-        self.frames += 1;
         g.because("first frame of the environment");
         self.environment.update(g);
         for material in &glinting {
@@ -287,6 +292,7 @@ impl Renderer {
 
         g.because("every frame");
         let frame = self.upload_frame(g, view);
+        self.newest = Some(frame.resource().id);
         let ids = passes::visibility::visibility(g, &self.buffers, &frame, extent);
         let gbuffer = passes::surface::surface(g, &self.buffers, &frame, ids);
         let mut rays = Vec::new();
@@ -328,8 +334,9 @@ impl Renderer {
         Ok(Frame { radiance, display, updates, rays, left_out })
     }
 
-    /// Declares rays of the caller's own: each of the first `count` in `rays`, [`types::Ray`]s in scene space, gets a
-    /// [`types::RayAnswer`] in `answers`. Returns the [`types::RayCounts`]. What the occluders need is brought up to date
+    /// Declares rays of the caller's own: each of the first `count` in `rays`, [`Ray`](crate::Ray)s in scene space, gets a
+    /// [`RayAnswer`](crate::RayAnswer) in `answers`. Returns the [`RayCounts`](crate::RayCounts). There may be as many as the
+    /// device lets a shader bind (`max_storage_buffer_range_bytes` in [`mica_gpu::Limits`]): a run refuses more. What the occluders need is brought up to date
     /// first, and everything else is as for [`Renderer::frame`].
     ///
     /// # Errors
@@ -354,6 +361,7 @@ impl Renderer {
         let Some(occluders) = &self.occluders else { return Err(RenderError::NoOcclusion) };
         g.because("rays of the caller's own");
         let counted = passes::trace::trace(g, &self.buffers, occluders, (rays, count), question, answers);
+        self.newest = Some(counted.counts.resource().id);
         Ok(counted.counts)
     }
 
@@ -371,9 +379,12 @@ impl Renderer {
                 none.as_mut()
             }
         };
+        let newest = self.newest;
+        let in_newest = |pass: &Pass| pass.uses.iter().any(|used| Some(used.resource.id) == newest);
+        self.graphs += u64::from(!g.passes().iter().any(in_newest));
         self.buffers.update(g, &self.scene);
         if let Some(occluders) = occluders {
-            occluders.update(g, &self.scene, &self.buffers, self.frames);
+            occluders.update(g, &self.scene, &self.buffers, self.graphs);
         }
         Ok(())
     }

@@ -124,6 +124,11 @@ impl SceneBuffers {
         DAffine3::from_translation(-self.center) * instance.world_from_local
     }
 
+    /// The corners of the box of a mesh, in its own space; none without triangles.
+    pub fn box_corners(&self, mesh: usize) -> impl Iterator<Item = [f32; 3]> {
+        corners(self.mesh_bounds[mesh], DAffine3::IDENTITY).map(|corner| corner.as_vec3().to_array())
+    }
+
     /// Takes note that an instance moved.
     pub fn note_moved(&mut self, instance: usize) {
         self.moved.insert(instance);

@@ -205,7 +205,8 @@ pub struct BenchArgs {
     /// Writes a line of JSON for each scene and body; `-` is stdout, in place of the table.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// A device, by a part of its name or its number (see `mica doctor`). Default: the best there is.
+    /// A device, by its number or a part of its name or of its driver's name and version (see `mica doctor`). Default:
+    /// the best there is.
     #[arg(long, value_name = "NAME|INDEX")]
     pub device: Option<String>,
     /// Most device memory to take, as in `mica render`.

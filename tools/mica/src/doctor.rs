@@ -7,7 +7,7 @@ use crate::progress::Progress;
 use crate::session::Session;
 use crate::table;
 use clap::Parser;
-use mica_gpu::{Device, DeviceInfo, DeviceOptions, Error, Timing, devices};
+use mica_gpu::{Device, DeviceInfo, DeviceKind, DeviceOptions, Error, Timing, devices};
 use mica_render::OcclusionBackend;
 use serde::Serialize;
 use std::ffi::OsString;
@@ -196,6 +196,17 @@ fn trial(args: &DoctorArgs) -> Trial {
     }
 }
 
+/// How to see a software driver with ray queries beside one without.
+fn hint(devices: &[DeviceFound]) -> &'static str {
+    match devices {
+        [only] if only.kind == DeviceKind::Cpu.name() && !only.ray_query => {
+            "drivers: those that VK_DRIVER_FILES names, if it is set; in a checkout, VK_DRIVER_FILES=$(ci/drivers) names one with \
+             ray queries too\n"
+        }
+        _ => "",
+    }
+}
+
 fn for_people(report: &DoctorReport) -> String {
     let mut text = String::new();
     for device in &report.devices {
@@ -217,6 +228,7 @@ fn for_people(report: &DoctorReport) -> String {
         let rays = if device.ray_query { "offered" } else { "not offered" };
         text += &format!("  occlusion: {body}, because {why}; ray queries {rays}\n");
     }
+    text += hint(&report.devices);
     text += &match &report.validation.error {
         None => "validation: there, for --validation\n".to_owned(),
         Some(error) => format!("validation: not there, which only --validation needs ({error})\n"),

@@ -24,7 +24,9 @@ pub enum OcclusionBackend {
     None,
     /// A hierarchy of bounding volumes that the host builds, traversed in compute shaders.
     Bvh,
-    /// The device's own acceleration structures, by ray queries.
+    /// The device's own acceleration structures, by ray queries. A device without them ([`DeviceInfo::offers_ray_query`])
+    /// refuses the frame when it is run or recorded, and [`Renderer::precompute`](crate::Renderer::precompute) what builds
+    /// them, with an error that says what the device lacks.
     RayQuery,
 }
 
@@ -79,6 +81,9 @@ type Places = [(usize, DAffine3)];
 /// Why occluders come to be.
 const FIRST_ASKED: &str = "first frame that asks for occlusion";
 
+/// What long work is called while it is under way.
+const BUILDING: &str = "building occlusion";
+
 /// How often long work on the host reports its progress.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(20);
 
@@ -117,7 +122,7 @@ impl Occluders {
         let body = match backend {
             OcclusionBackend::None => return Ok(None),
             OcclusionBackend::Bvh => Body::Bvh(Bvh::build(scene, &places, placed)?),
-            OcclusionBackend::RayQuery => Body::Structures(Structures::new(scene, &places)?),
+            OcclusionBackend::RayQuery => Body::Structures(Structures::new(scene, buffers, &places)?),
         };
         let masked = scene.instances.iter().any(|instance| {
             let mesh = &scene.meshes[instance.mesh];
@@ -145,27 +150,32 @@ impl Occluders {
         let mut updates = Vec::new();
         if let Some(Self { body: Body::Structures(structures), declared, .. }) = &mut occluders {
             *declared = true;
+            progress(BUILDING, 0, 2);
             let mut g = Graph::new();
             buffers.upload_triangles(&mut g);
             structures.build(&mut g, scene, buffers, 0);
             updates.extend(run(executor, g)?);
+            progress(BUILDING, 1, 2);
             // Once the builds are finished, the device knows how large the copies are.
             let mut g = Graph::new();
             structures.compact(&mut g, |_| true);
             structures.build_top(&mut g);
             updates.extend(run(executor, g)?);
+            progress(BUILDING, 2, 2);
         }
         Ok((occluders, updates))
     }
 
-    /// Builds a hierarchy on another thread while this one reports how many triangles have found their place in it.
+    /// Builds a hierarchy on another thread while this one reports how many triangles and instances have found their
+    /// place in it.
     fn built_with_progress(
         scene: &Scene,
         buffers: &SceneBuffers,
         progress: Progress,
     ) -> Result<Option<Self>, RenderError> {
         let placed = AtomicU64::new(0);
-        let all = scene.meshes.iter().map(|mesh| mesh.triangle_count() as u64).sum();
+        let triangles: u64 = scene.meshes.iter().map(|mesh| mesh.triangle_count() as u64).sum();
+        let all = triangles + scene.instances.len() as u64;
         // Nothing is sent: the channel closes when the builder ends, however it does.
         let (at_work, ended) = mpsc::channel::<()>();
         std::thread::scope(|threads| {
@@ -174,10 +184,10 @@ impl Occluders {
                 Self::new_counting(OcclusionBackend::Bvh, scene, buffers, Some(&placed))
             });
             while ended.recv_timeout(PROGRESS_INTERVAL) == Err(RecvTimeoutError::Timeout) {
-                progress("building occlusion", placed.load(Ordering::Relaxed), all);
+                progress(BUILDING, placed.load(Ordering::Relaxed), all);
             }
             let built = builder.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-            progress("building occlusion", all, all);
+            progress(BUILDING, all, all);
             built
         })
     }
@@ -194,15 +204,15 @@ impl Occluders {
         let places = all_places(scene, buffers);
         let moved: Vec<(usize, DAffine3)> = self.moved.iter().map(|&index| (index, places[index].1)).collect();
         match &mut self.body {
-            Body::Bvh(bvh) => bvh.place(scene, &places, &moved)?,
-            Body::Structures(structures) => structures.place(scene, &places, &moved, why.clone())?,
+            Body::Bvh(bvh) => bvh.place(scene, buffers, &places, &moved)?,
+            Body::Structures(structures) => structures.place(scene, buffers, &places, &moved, why.clone())?,
         }
         self.moved.clear();
         self.why = why;
         Ok(())
     }
 
-    /// Declares what brings them up to date in the `frame`-th frame.
+    /// Declares what brings them up to date in the `frame`-th graph that does.
     pub fn update(&mut self, g: &mut Graph, scene: &Scene, buffers: &SceneBuffers, frame: u64) {
         self.declared = true;
         g.because(self.why.clone());
@@ -231,11 +241,6 @@ fn all_places(scene: &Scene, buffers: &SceneBuffers) -> Vec<(usize, DAffine3)> {
 /// Whether an alpha mask cuts holes into a mesh.
 fn is_masked(scene: &Scene, mesh: &Mesh) -> bool {
     scene.materials.get(mesh.material).is_some_and(|material| material.alpha != AlphaMode::Opaque)
-}
-
-/// The corners of the triangles of a mesh.
-fn corners_of(mesh: &Mesh) -> impl Iterator<Item = [f32; 3]> {
-    mesh.indices.iter().map(|&vertex| mesh.positions[vertex as usize])
 }
 
 /// Runs a frame of updates, each pass by itself; uploads are no news.

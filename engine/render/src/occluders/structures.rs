@@ -1,6 +1,6 @@
 //! Occluders as the device's own acceleration structures.
 
-use super::{Places, corners_of, is_masked};
+use super::{Places, is_masked};
 use crate::RenderError;
 use crate::scene::bvh::{Placed, Placements, check};
 use crate::scene::{Mesh, Scene};
@@ -13,10 +13,10 @@ use std::collections::BTreeMap;
 /// length of its pass, and on GPUs that grows with its triangles.
 const TRIANGLES_A_PASS: u64 = 1 << 20;
 
-/// Frames from a build to the copy without spare room. How much the copy takes is known only when the device has finished
+/// Graphs from a build to the copy without spare room. How much the copy takes is known only when the device has finished
 /// the build, and a host may have several frames under way: by default an executor allows three. If one allows more, and
 /// the size is not known yet, the copy takes as much as the original.
-const FRAMES_TO_COMPACTION: u64 = 4;
+const GRAPHS_TO_COMPACTION: u64 = 4;
 
 /// The triangles of a bottom level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -58,11 +58,11 @@ pub(crate) struct Structures {
 
 impl Structures {
     /// For a scene as it stands: nothing is built yet.
-    pub fn new(scene: &Scene, places: &Places) -> Result<Self, RenderError> {
+    pub fn new(scene: &Scene, buffers: &SceneBuffers, places: &Places) -> Result<Self, RenderError> {
         for mesh in &scene.meshes {
             check(&mesh.positions, &mesh.indices)?;
         }
-        let placements = Placements::new(places, scene.meshes.len(), |mesh| corners_of(&scene.meshes[mesh]))?;
+        let placements = Placements::new(places, scene.meshes.len(), |mesh| buffers.box_corners(mesh))?;
         let top = Structure::over_instances("structure of scene", placements.list().len() as u32, Lifetime::Scene);
         let mut structures =
             Self { scene: top, placements, bottoms: BTreeMap::new(), stale: Some(super::FIRST_ASKED.to_owned()) };
@@ -71,11 +71,19 @@ impl Structures {
     }
 
     /// Follows instances that moved.
-    pub fn place(&mut self, scene: &Scene, places: &Places, moved: &Places, why: String) -> Result<(), RenderError> {
-        match self.placements.moved(moved, |mesh| corners_of(&scene.meshes[mesh]))? {
+    pub fn place(
+        &mut self,
+        scene: &Scene,
+        buffers: &SceneBuffers,
+        places: &Places,
+        moved: &Places,
+        why: String,
+    ) -> Result<(), RenderError> {
+        let corners_of = |mesh| buffers.box_corners(mesh);
+        match self.placements.moved(moved, corners_of)? {
             Some(placements) => self.placements = placements,
             None => {
-                self.placements = Placements::new(places, scene.meshes.len(), |mesh| corners_of(&scene.meshes[mesh]))?;
+                self.placements = Placements::new(places, scene.meshes.len(), corners_of)?;
                 for (instance, _) in moved {
                     self.bottoms.remove(&Triangles::OfInstance(*instance));
                 }
@@ -96,10 +104,10 @@ impl Structures {
         }
     }
 
-    /// Declares what brings them up to date in the `frame`-th frame.
+    /// Declares what brings them up to date in the `frame`-th graph that does.
     pub fn update(&mut self, g: &mut Graph, scene: &Scene, buffers: &SceneBuffers, frame: u64) {
         self.build(g, scene, buffers, frame);
-        self.compact(g, |built| frame >= built + FRAMES_TO_COMPACTION);
+        self.compact(g, |built| frame >= built + GRAPHS_TO_COMPACTION);
         self.build_top(g);
     }
 

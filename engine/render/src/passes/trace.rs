@@ -6,6 +6,9 @@ use crate::scene_buffers::SceneBuffers;
 use mica_graph::{Buffer, Extent, Graph};
 use mica_shaders::types;
 
+/// Rays in one row of the dispatch: every device runs 65,535 groups, of 64 each, along an axis.
+const RAYS_A_ROW: u32 = 65_535 * 64;
+
 /// What is asked about a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Question {
@@ -37,13 +40,14 @@ pub(crate) fn trace(
     question: Question,
     answers: &mut Buffer,
 ) -> RaysOfPass {
+    let extent = Extent::new(count.min(RAYS_A_ROW), count.div_ceil(RAYS_A_ROW));
     let mut counted = RaysOfPass::none_yet(g, "trace_rays");
     pass_with_rays!(
         g,
         trace_rays,
         occluders,
         scene,
-        Extent::line(count),
+        extent,
         Params { count, closest: u32::from(question == Question::Closest), scene_unit: scene.scene_unit },
         Bind { rays, ray_answers: answers, ray_counts: &mut counted.counts }
     );

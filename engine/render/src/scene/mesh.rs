@@ -1,6 +1,6 @@
 //! Triangles and where they stand.
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 /// One list of triangles with one material: a glTF primitive, after repair.
 ///
@@ -38,9 +38,14 @@ impl Mesh {
         self.indices.len() / 3
     }
 
-    /// The smallest box around the positions, in the mesh's space; none when there are no vertices.
+    /// The smallest box around the triangles, in the mesh's space; none when there are none. Vertices that no triangle has
+    /// may be anywhere.
     pub fn bounds(&self) -> Option<Bounds> {
-        Bounds::around(self.positions.iter().map(|&p| DVec3::from(p.map(f64::from))))
+        let used = self.indices.iter().filter_map(|&vertex| self.positions.get(vertex as usize));
+        let [min, max] = used
+            .map(|&corner| [Vec3::from(corner); 2])
+            .reduce(|[low, high], [min, max]| [low.min(min), high.max(max)])?;
+        Some(Bounds { min: min.as_dvec3(), max: max.as_dvec3() })
     }
 
     /// Drops the vertices that no triangle has, as of an array that many primitives of a file share.

@@ -25,8 +25,6 @@ use std::path::{Path, PathBuf};
 const DEFAULT_SCENES: [&str; 2] = ["shoe", "drift"];
 /// Rounds before those that are measured.
 const WARMUP: u32 = 1;
-/// Invocations of a group of the pass that traces.
-const GROUP: u64 = 64;
 
 /// Measures, writes and prints. What was measured before Ctrl-C or a failure is kept.
 pub fn occlusion(args: &BenchArgs) -> Result<(), Failure> {
@@ -106,8 +104,7 @@ pub fn occlusion(args: &BenchArgs) -> Result<(), Failure> {
 /// Says early what no device would be given.
 fn check_counts(args: &BenchArgs, device: &DeviceInfo) -> Result<(), Failure> {
     let each = size_of::<Ray>().max(size_of::<RayAnswer>()) as u64;
-    let limits = &device.limits;
-    let most = (limits.max_storage_buffer_range_bytes / each).min(u64::from(limits.max_groups[0]) * GROUP);
+    let most = device.limits.max_storage_buffer_range_bytes / each;
     let [width, height] = args.size;
     let pixels = u64::from(width) * u64::from(height);
     for (option, count) in

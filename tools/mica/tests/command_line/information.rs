@@ -99,6 +99,8 @@ fn the_doctor_finds_a_machine_that_renders() {
         assert_eq!(device["ray_query"] == true, device["ray_query_lacks"] == serde_json::json!([]), "{device}");
         assert!(text.contains(&format!("\n  occlusion: {body}, because {why}; ray queries ")), "{text}");
     }
+    let alone = matches!(&devices[..], [only] if only["kind"] == "CPU" && only["ray_query"] == false);
+    assert_eq!(text.contains("VK_DRIVER_FILES=$(ci/drivers)"), alone, "{text}");
 }
 
 /// Runs the program where no driver can be found.

@@ -1,9 +1,10 @@
 //! Where the instances of a scene are, and which of them f32 can look at in their own space.
 
-use super::{BvhError, LARGEST_COORDINATE};
+use super::{Bounds, BvhError, LARGEST_COORDINATE};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use mica_shaders::constants::BVH_SCENE_LEVELS;
 use rayon::prelude::*;
+use std::ops::RangeInclusive;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Instances in one scene, at most: what halving alone can tell apart in [`BVH_SCENE_LEVELS`].
@@ -19,6 +20,10 @@ const RAY_ROUNDOFF: f64 = 32.0 * 0.5 * f32::EPSILON as f64;
 /// scene's after: these stay as they are, and rays that leave their surfaces do not meet them again.
 const TOLERABLE_GAIN: f64 = 8.0;
 
+/// How far from the local origin a ray may begin, at most and at least: products of three such lengths, as in the test of
+/// triangles, stay within f32.
+const LOCAL_REACH: RangeInclusive<f64> = 1.0 / LARGEST_COORDINATE as f64..=LARGEST_COORDINATE as f64;
+
 /// An instance that a ray can meet.
 #[derive(Clone, Debug)]
 pub struct Placed {
@@ -28,7 +33,7 @@ pub struct Placed {
     pub mesh: usize,
     /// From the space of the mesh to scene space.
     pub scene_from_local: DAffine3,
-    /// The least corner of its box in scene space, without the rounding of f32.
+    /// The least corner, in scene space and without the rounding of f32, of the box around the box of its mesh.
     pub lower: DVec3,
     /// The greatest corner of that box.
     pub upper: DVec3,
@@ -45,7 +50,7 @@ pub struct Placements {
 
 impl Placements {
     /// Of `instances`: the index of one of so many `meshes`, and where it is in scene space. `corners_of` a mesh are those of
-    /// its triangles. Instances without triangles are left out.
+    /// its triangles, or those of the box around them: only that box is looked at. Instances without triangles are left out.
     ///
     /// # Errors
     /// [`BvhError`] for meshes that do not exist and transforms that are not finite or leave the range of coordinates.
@@ -67,11 +72,12 @@ impl Placements {
         if instances.len() > MAX_INSTANCES {
             return Err(BvhError::TooMany { what: "instances", count: instances.len(), limit: MAX_INSTANCES });
         }
+        let boxes: Vec<Option<[DVec3; 2]>> = (0..meshes).into_par_iter().map(|mesh| box_of(corners_of(mesh))).collect();
         let locate = |(instance, &(mesh, scene_from_local)): (usize, &(usize, DAffine3))| {
             if mesh >= meshes {
                 return Err(BvhError::NoSuchMesh { instance, mesh, meshes });
             }
-            let located = Placed::new(instance, mesh, scene_from_local, corners_of(mesh));
+            let located = Placed::new(instance, mesh, scene_from_local, boxes[mesh]);
             if let Some(placed) = placed {
                 placed.fetch_add(1, Ordering::Relaxed);
             }
@@ -88,7 +94,7 @@ impl Placements {
     }
 
     /// The same after instances were moved, each to where it then is in scene space; `None` where that changes what has to
-    /// be stored in scene space. `corners_of` as in [`Placements::new`].
+    /// be stored in scene space. `corners_of` as in [`Placements::new`]; 8 are quicker than those of all triangles.
     ///
     /// # Errors
     /// [`BvhError`] for transforms that are not finite or leave the range of coordinates.
@@ -102,7 +108,9 @@ impl Placements {
             // One without triangles is nowhere, and stays there.
             let Ok(position) = list.binary_search_by_key(&instance, |placed| placed.instance) else { continue };
             let mesh = list[position].mesh;
-            let Some(placed) = Placed::new(instance, mesh, scene_from_local, corners_of(mesh))? else { continue };
+            let Some(placed) = Placed::new(instance, mesh, scene_from_local, box_of(corners_of(mesh)))? else {
+                continue;
+            };
             if list[position].in_scene_space {
                 return Ok(None);
             }
@@ -131,16 +139,18 @@ impl Placements {
 }
 
 impl Placed {
-    /// Locates an instance; `None` without corners.
+    /// Locates an instance by the box of its mesh, from the least corner to the greatest; `None` without one.
     fn new(
         instance: usize,
         mesh: usize,
         scene_from_local: DAffine3,
-        corners: impl Iterator<Item = [f32; 3]>,
+        local_box: Option<[DVec3; 2]>,
     ) -> Result<Option<Self>, BvhError> {
+        let Some(ends) = local_box else { return Ok(None) };
         let (mut lower, mut upper) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for corner in corners {
-            let corner = scene_from_local.transform_point3(Vec3::from(corner).as_dvec3());
+        for k in 0..8 {
+            let pick = |axis: usize| ends[k >> axis & 1][axis];
+            let corner = scene_from_local.transform_point3(DVec3::new(pick(0), pick(1), pick(2)));
             // Written so that NaN fails.
             if !corner.abs().cmple(DVec3::splat(f64::from(LARGEST_COORDINATE))).all() {
                 return Err(BvhError::BadTransform { instance });
@@ -148,23 +158,99 @@ impl Placed {
             lower = lower.min(corner);
             upper = upper.max(corner);
         }
-        let placed = Self { instance, mesh, scene_from_local, lower, upper, in_scene_space: false };
-        Ok((lower.x <= upper.x).then_some(placed))
+        Ok(Some(Self { instance, mesh, scene_from_local, lower, upper, in_scene_space: false }))
     }
 
     /// How far, along each axis of scene space, a ray traced in local space by f32 may pass from where it should; `None`
     /// where that is too far, or the transform has no inverse.
     ///
     /// The local origin `M o + t`, and any point along the ray, carries [`RAY_ROUNDOFF`] in each of its terms, and `W` takes
-    /// that back to scene space: with `R` the reach of the scene, `|W| (|M| R + |t|)` bounds the sum of the terms.
+    /// that back to scene space: with `R` the reach of the scene, `|W| (|M| R + |t|)` bounds the sum of the terms. Coefficients
+    /// below the least normal f32 may become 0 on the way to the device: that is the second part.
     pub(super) fn ray_error(&self, reach: DVec3) -> Option<DVec3> {
         let scene_from_local = self.scene_from_local;
         let local_from_scene = scene_from_local.inverse();
         let absolute = |matrix: DMat3| DMat3::from_cols(matrix.x_axis.abs(), matrix.y_axis.abs(), matrix.z_axis.abs());
         let local = absolute(local_from_scene.matrix3) * reach + local_from_scene.translation.abs();
-        let error = RAY_ROUNDOFF * (absolute(scene_from_local.matrix3) * local);
+        let vanishing = f64::from(f32::MIN_POSITIVE) * (reach.element_sum() + 1.0);
+        let terms = RAY_ROUNDOFF * local + vanishing;
+        let error = absolute(scene_from_local.matrix3) * terms;
+        let fits = |map: &DMat3| map.to_cols_array().iter().all(|&coefficient| (coefficient as f32).is_finite());
         let tolerable = TOLERABLE_GAIN * RAY_ROUNDOFF * reach.max_element();
         // Written so that NaN, from a transform without inverse, fails.
-        error.cmple(DVec3::splat(tolerable)).all().then_some(error)
+        let exact_enough = error.cmple(DVec3::splat(tolerable)).all();
+        let in_range = LOCAL_REACH.contains(&local.max_element())
+            && fits(&scene_from_local.matrix3)
+            && fits(&local_from_scene.matrix3);
+        (exact_enough && in_range).then_some(error)
+    }
+}
+
+/// The least and the greatest corner of the box around points; `None` around none.
+fn box_of(points: impl Iterator<Item = [f32; 3]>) -> Option<[DVec3; 2]> {
+    let bounds = points.map(Bounds::of_point).reduce(Bounds::union)?;
+    Some([bounds.lower, bounds.upper].map(|corner| Vec3::from(corner).as_dvec3()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DQuat;
+    use std::sync::atomic::AtomicUsize;
+
+    const POINTS: [[f32; 3]; 4] = [[-1.0, 2.0, 0.0], [1.0, 0.5, -0.25], [0.0, -1.0, 0.5], [0.25, 0.0, 0.125]];
+
+    /// The corners of the box around [`POINTS`].
+    fn box_corners() -> impl Iterator<Item = [f32; 3]> {
+        let pick = |k: usize, bit: usize, ends: [f32; 2]| ends[k >> bit & 1];
+        (0..8).map(move |k| [pick(k, 0, [-1.0, 1.0]), pick(k, 1, [-1.0, 2.0]), pick(k, 2, [-0.25, 0.5])])
+    }
+
+    fn places() -> Vec<(usize, DAffine3)> {
+        let turned = |turn| DAffine3::from_rotation_translation(DQuat::from_rotation_y(turn), DVec3::splat(turn));
+        (0..9).map(|k| (0, turned(f64::from(k)))).collect()
+    }
+
+    #[test]
+    fn the_corners_of_a_mesh_are_walked_once_however_many_instances_it_has() {
+        let asked = AtomicUsize::new(0);
+        let corners = |_| {
+            asked.fetch_add(1, Ordering::Relaxed);
+            POINTS.into_iter()
+        };
+        let made = Placements::new(&places(), 1, corners).expect("usable places");
+        assert_eq!((made.list().len(), asked.into_inner()), (9, 1));
+    }
+
+    #[test]
+    fn the_box_of_a_mesh_places_it_as_its_corners_do() {
+        let bits = |placements: &Placements| -> Vec<_> {
+            placements.list().iter().map(|placed| (placed.lower, placed.upper, placed.in_scene_space)).collect()
+        };
+        let made = Placements::new(&places(), 1, |_| POINTS.into_iter()).expect("usable places");
+        assert_eq!(bits(&made), bits(&Placements::new(&places(), 1, |_| box_corners()).expect("usable places")));
+        let mut there = places();
+        there[4].1 = DAffine3::from_rotation_x(0.3);
+        let moved = made.moved(&[(4, there[4].1)], |_| box_corners()).expect("usable places").expect("stored alike");
+        let fresh = Placements::new(&there, 1, |_| POINTS.into_iter()).expect("usable places");
+        assert_eq!(bits(&moved), bits(&fresh));
+        assert_ne!(bits(&moved), bits(&made));
+    }
+
+    /// Whether the transform is large, small, or has an inverse that is.
+    #[test]
+    fn what_f32_cannot_hold_is_stored_in_scene_space() {
+        let stored = |x: f64, size: f32| {
+            let points = POINTS.map(|point| [point[0] * size, point[1], point[2]]);
+            let place = DAffine3::from_scale(DVec3::new(x, 1.0, 1.0));
+            let made = Placements::new(&[(0, place)], 1, |_| points.into_iter()).expect("a usable place");
+            made.list()[0].in_scene_space
+        };
+        for (x, size) in [(1e-46, 1.0), (1e-39, 1.0), (-1e-46, 1e12), (1e39, 1e-38), (1e38, 1e-38)] {
+            assert!(stored(x, size), "{x}, a mesh {size} wide");
+        }
+        for (x, size) in [(1.0, 1.0), (1e-6, 1.0), (1e-11, 1e11), (1e6, 1.0), (1e11, 1e-11), (1e20, 1e-20)] {
+            assert!(!stored(x, size), "{x}, a mesh {size} wide");
+        }
     }
 }

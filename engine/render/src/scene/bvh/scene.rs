@@ -51,7 +51,7 @@ impl SceneBvh {
         Self::build_with(instances, meshes, None)
     }
 
-    /// As [`SceneBvh::build`]; `placed` is raised by 1 for each instance whose box is known, which is most of the work.
+    /// As [`SceneBvh::build`]; `placed` is raised by 1 for each instance whose box is known.
     ///
     /// # Errors
     /// As [`SceneBvh::build`].
@@ -107,8 +107,8 @@ impl SceneBvh {
 }
 
 impl SceneTop {
-    /// Moves instances, each to where it then is in scene space, without touching what lies below them. `corners_of` a mesh
-    /// are those of its triangles, as they were when the scene was built.
+    /// Moves instances, each to where it then is in scene space, without touching what lies below them. `corners_of` as in
+    /// [`Placements::new`], as they were when the scene was built.
     ///
     /// `None` where the scene has to be built anew from its meshes, since triangles stored in scene space would move, or
     /// would now have to be stored there; nothing has changed then.
@@ -123,6 +123,11 @@ impl SceneTop {
         let Some(placements) = self.placements.moved(moved, corners_of)? else { return Ok(None) };
         self.placements = placements;
         Ok(Some(self.level()))
+    }
+
+    /// Whether any instance is stored in scene space, as triangles of its own.
+    pub fn stores_in_scene_space(&self) -> bool {
+        self.placements.list().iter().any(|placed| placed.in_scene_space)
     }
 
     fn level(&self) -> TopLevel {
