@@ -572,11 +572,13 @@ fn ray_queries_are_the_choice_of_gpus_that_have_them() {
     for kind in [DeviceKind::Discrete, DeviceKind::Integrated, DeviceKind::Virtual, DeviceKind::Cpu] {
         info.kind = kind;
         info.ray_query_lacks = Vec::new();
-        let (body, why) = OcclusionBackend::auto(&info);
+        let (body, why) = OcclusionBackend::auto(&info, 1_000_000);
         let expected = if kind == DeviceKind::Cpu { OcclusionBackend::Bvh } else { OcclusionBackend::RayQuery };
         assert_eq!(body, expected, "{kind:?}: {why}");
+        let (body, why) = OcclusionBackend::auto(&info, info.limits.max_storage_buffer_range_bytes);
+        assert_eq!(body, OcclusionBackend::RayQuery, "more triangles than a buffer holds: {why}");
         info.ray_query_lacks = vec!["VK_KHR_ray_query".to_owned()];
-        let (body, why) = OcclusionBackend::auto(&info);
+        let (body, why) = OcclusionBackend::auto(&info, u64::MAX);
         assert_eq!(body, OcclusionBackend::Bvh, "{kind:?}: {why}");
         assert!(why.contains("VK_KHR_ray_query"), "{kind:?}: {why}");
     }

@@ -198,9 +198,16 @@ fn choose(found: Vec<Found>, select: Option<&str>) -> Result<Found, Error> {
     };
     let wanted = select.to_lowercase();
     let index = select.parse::<usize>().ok();
-    let words = |info: &DeviceInfo| format!("{} {} {}", info.name, info.driver, info.driver_version).to_lowercase();
-    let fits = |info: &DeviceInfo| index == Some(info.index) || words(info).contains(&wanted);
-    // An index is meant as one, even where a name has the same digits in it.
+    let text = |info: &DeviceInfo| format!("{} {} {}", info.name, info.driver, info.driver_version).to_lowercase();
+    // A number is an index first, and then a whole word (an RTX 4090) or the beginning of a version; not any digits.
+    let has_word = |info: &DeviceInfo| {
+        let is_it = |word: &str| word.strip_prefix(&wanted).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+        text(info).split([' ', '(', ')', ',']).any(is_it)
+    };
+    let fits = |info: &DeviceInfo| match index {
+        Some(index) => index == info.index || has_word(info),
+        None => !wanted.is_empty() && text(info).contains(&wanted),
+    };
     let mut matching: Vec<Found> = found.into_iter().filter(|(_, info)| fits(info)).collect();
     matching.sort_by_key(|(_, info)| (index != Some(info.index), info.unusable.is_some(), info.kind));
     let Some((physical, info)) = matching.into_iter().next() else {

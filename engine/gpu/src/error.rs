@@ -104,7 +104,8 @@ pub enum Error {
     },
     /// A buffer is larger than a shader of this device can see.
     #[error(
-        "pass {pass}: buffer {resource} has {bytes} bytes and {limit_name} of this device is {limit}; use fewer glints or split it"
+        "pass {pass}: buffer {resource} has {bytes} bytes and {limit_name} of this device is {limit}; \
+         use a smaller scene or fewer glints"
     )]
     BufferRange {
         /// The pass.

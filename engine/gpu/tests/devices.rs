@@ -24,6 +24,11 @@ fn a_device_is_selected_by_index_or_by_part_of_its_name() {
     for name in [usable.index.to_string(), usable.name.clone(), usable.name[..4].to_uppercase()] {
         assert_eq!(select(&name).expect("it is found").info(), usable);
     }
+    // Digits within a name or a version are neither an index nor a word, and nothing is no part of anything.
+    for number in ["99", ""] {
+        let error = select(number).expect_err("there is none");
+        assert!(matches!(error, Error::NoSuchDevice { .. }), "{number}: {error}");
+    }
     let error = select("no such device").expect_err("there is none");
     assert!(matches!(error, Error::NoSuchDevice { .. }) && error.exit_code() == 3);
     let text = error.to_string();

@@ -91,7 +91,7 @@ impl Occlusion {
         if info.unusable.is_some() {
             return Self { body: OcclusionBackend::None.name(), why: "the device cannot be used".to_owned() };
         }
-        let (backend, why) = OcclusionBackend::auto(info);
+        let (backend, why) = OcclusionBackend::auto(info, 0);
         Self { body: backend.name(), why }
     }
 }

@@ -54,9 +54,12 @@ impl From<mica_gpu::Error> for Failure {
         let message = match error {
             // The library cannot know how its host lets the limit be raised.
             mica_gpu::Error::MemoryLimit { what, bytes, used, limit } => format!(
-                "out of memory: {what} needs {bytes} bytes, and of the {limit} that may be taken {used} are; use a \
-                 smaller --size, or allow more with --memory"
+                "out of memory: {what} needs {bytes} bytes, which with what is there makes {used}, and {limit} may be \
+                 taken; use a smaller --size or scene, or --occlusion none, or allow more with --memory"
             ),
+            error @ mica_gpu::Error::BufferRange { .. } if error.to_string().contains("buffer bvh_") => {
+                format!("{error}; --occlusion none does without it, as does ray-query on a device that offers it")
+            }
             error => error.to_string(),
         };
         Self::with_code(code, message)
@@ -67,6 +70,7 @@ impl From<RenderError> for Failure {
     fn from(error: RenderError) -> Self {
         match error {
             RenderError::Gpu(error) => error.into(),
+            error @ RenderError::Bvh(_) => Self::bad_input(format!("{error}; or render with --occlusion none")),
             error => Self::bad_input(error.to_string()),
         }
     }

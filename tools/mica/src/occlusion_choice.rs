@@ -13,11 +13,11 @@ pub struct ChosenOcclusion {
     pub why: String,
 }
 
-/// Takes what was asked for, or what suits the device.
-pub fn choose(choice: OcclusionChoice, device: &DeviceInfo) -> Result<ChosenOcclusion, Failure> {
+/// Takes what was asked for, or what suits the device and a scene of so many triangles.
+pub fn choose(choice: OcclusionChoice, device: &DeviceInfo, triangles: u64) -> Result<ChosenOcclusion, Failure> {
     let backend = match choice {
         OcclusionChoice::Auto => {
-            let (backend, why) = OcclusionBackend::auto(device);
+            let (backend, why) = OcclusionBackend::auto(device, triangles);
             return Ok(ChosenOcclusion { backend, why });
         }
         OcclusionChoice::RayQuery if !device.offers_ray_query() => {

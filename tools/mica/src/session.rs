@@ -104,7 +104,8 @@ impl Session {
 
         let device = Device::new(&DeviceOptions { select: args.device.clone(), validation: args.validation })?;
         check_size(args.size, device.info())?;
-        let occlusion = occlusion_choice::choose(args.occlusion, device.info())?;
+        let triangles = chosen.scene.meshes.iter().map(|mesh| mesh.triangle_count() as u64).sum();
+        let occlusion = occlusion_choice::choose(args.occlusion, device.info(), triangles)?;
 
         let ChosenScene { name, scene, .. } = chosen;
         let mut renderer = Renderer::new(scene, &args.light, environment.environment.as_ref(), occlusion.backend)?;

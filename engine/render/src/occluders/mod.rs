@@ -40,13 +40,19 @@ impl OcclusionBackend {
         }
     }
 
-    /// Which one is best on a device, and why.
-    pub fn auto(device: &DeviceInfo) -> (Self, String) {
+    /// Which one is best on a device for a scene of so many triangles (of its meshes, however often each is placed), and
+    /// why.
+    pub fn auto(device: &DeviceInfo, triangles: u64) -> (Self, String) {
         if !device.offers_ray_query() {
             return (
                 Self::Bvh,
                 format!("{} offers no ray queries: it lacks {}", device.name, device.ray_query_lacks.join(", ")),
             );
+        }
+        let (bytes, most) =
+            (triangles.saturating_mul(size_of::<types::BvhTriangle>() as u64), device.limits.max_storage_buffer_range_bytes);
+        if bytes > most {
+            return (Self::RayQuery, format!("{triangles} triangles take more than the {most} bytes of a buffer"));
         }
         if device.kind == DeviceKind::Cpu {
             // Mesa 25.0.7's lavapipe, 5,000 to 61,000 triangles: 2.1 to 2.9 times the rays a second.
