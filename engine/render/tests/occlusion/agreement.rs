@@ -1,19 +1,19 @@
 //! Ray query and BVH answer alike, and as f64 does, but for ties: `compare` says what they are, and those of each scene are
-//! counted and printed. Measured on Mesa 25.0.7's lavapipe: of 10.4 million rays neither body answers one wrong. Of the 2.4
-//! million in the embedded scenes 84,000 that are aimed at corners, at edges and along axes name another neighbour, and 370
-//! others do; 4,600 of all these hit for one body and pass the rim of the surface for the other.
+//! counted and printed. Measured on Mesa 25.0.7's lavapipe: of 10.1 million rays neither body answers one wrong. Of the 2.6
+//! million in the embedded scenes 91,000 that are aimed at corners, at edges and along axes name another neighbour, and 390
+//! others do; 4,500 of all these hit for one body and pass the rim of the surface for the other.
 
-use crate::changed::Changed;
+use crate::bodies::Bodies;
+use crate::bvh_tracer::BvhTracer;
 use crate::compare::{Answers, Tally, compare};
-use crate::device::Bodies;
 use crate::rays::of_every_kind;
 use crate::scenes;
 use crate::truth::World;
 use mica_render::OcclusionBackend;
 use mica_render::scene::Scene;
 
-/// Rays a scene, where there are two bodies: 10^7 in all.
-const RAYS: usize = 84 * 4096;
+/// Rays a scene, where there are two bodies: a little more than 10^7 in all.
+const RAYS: usize = 79 * 4096;
 
 /// Rays a scene, where there is one.
 const RAYS_OF_ONE: usize = 4 * 4096;
@@ -27,20 +27,30 @@ const TESTED: usize = 5_000_000;
 /// The share of the scene's rays that is asked: less where hundreds of triangles are tested for each ray.
 fn share(scene: &str) -> f64 {
     match scene {
-        "long sticks" | "without area" | "from 1e-4 to 1e6" => 0.05,
+        "long sticks" | "stick of 1e6" | "without area" | "from 1e-4 to 1e6" => 0.05,
         _ => 1.0,
     }
 }
 
-/// The share of rays that may be ties though not aimed at any: some where surfaces lie on each other, where segments
-/// between the same few triangles lie in their planes, where triangles are hardly wider than rounding, and where it is
-/// large beside the rays.
+/// The share of rays that may be ties though not aimed at any, half as much again as was measured on Mesa 25.0.7's lavapipe.
+/// Most are where surfaces lie on each other, where segments between the same few triangles lie in their planes, where
+/// triangles are hardly wider than rounding, and where it is large beside the rays.
 fn ties_expected(scene: &str) -> f64 {
     match scene {
-        "in one plane" | "flattened" => 0.3,
-        "one" | "two" | "long sticks" => 0.05,
-        "without area" | "copies" | "coordinates of 1e6" | "mixed" => 0.02,
-        _ => 1e-3,
+        "in one plane" => 0.35,
+        "flattened" => 0.23,
+        "one" | "long sticks" => 0.045,
+        "without area" => 0.016,
+        "two" => 0.012,
+        "mixed" | "stick of 1e6" => 0.0043,
+        "coordinates of 1e6" => 0.0032,
+        "shoe" | "plane" => 5e-4,
+        "copies" => 4.5e-4,
+        "snow" | "twelve instances" | "a hundred instances" | "scaled along the axes" | "skewed" => 3e-4,
+        "cloth" | "car" | "drift" | "collinear centroids" | "shrinking" => 2e-4,
+        "coordinates of 1e-4" | "mirrored" => 1e-4,
+        "empty" | "nothing but vertices" => 0.0,
+        _ => 5e-5,
     }
 }
 
@@ -61,12 +71,13 @@ fn both_bodies_answer_alike_and_as_f64_does() {
         let said: Vec<Answers> = asked.into_iter().map(|asked| (asked.of, asked.said)).collect();
         let every = (count * world.triangles().max(1)).div_ceil(TESTED);
         let tally = compare(&world, &rays, &said, every);
-        println!("{}", tally.line(&scene.name));
+        let most = (ties_expected(&scene.name) * count as f64).ceil() as usize;
+        println!("{}, {most} ties at most", tally.line(&scene.name));
         if tally.wrong.iter().any(|&wrong| wrong > 0) {
             faults.push(format!("{}: {:?} wrong\n{}", scene.name, tally.wrong, tally.shown.join("\n")));
         }
-        if tally.ties as f64 > ties_expected(&scene.name) * count as f64 {
-            faults.push(format!("{}: {} ties of {count} rays", scene.name, tally.ties));
+        if tally.ties > most {
+            faults.push(format!("{}: {} ties of {count} rays, {most} at most", scene.name, tally.ties));
         }
         if world.triangles() > 0 && tally.hits < count / 5 {
             faults.push(format!("{}: only {} of {count} rays hit", scene.name, tally.hits));
@@ -82,7 +93,7 @@ fn both_bodies_answer_alike_and_as_f64_does() {
 fn wrong_if(from: &str, to: &str, scene: &Scene) -> usize {
     let world = World::new(scene, scene.bounds().expect("a scene of something").center());
     let rays = of_every_kind(&world, 16_384, 1);
-    let said = [(OcclusionBackend::Bvh, Changed::new(from, to).ask(scene, &rays))];
+    let said = [(OcclusionBackend::Bvh, BvhTracer::changed(from, to).ask(scene, &rays))];
     compare(&world, &rays, &said, 1).wrong[0]
 }
 

@@ -4,7 +4,7 @@
 //! surely meets is nearer. Two right answers that differ are a tie, since the ray grazes an edge or two surfaces lie at
 //! the same distance within the bound of [`crate::truth`]. Every other difference is somebody's fault.
 
-use crate::device::Said;
+use crate::bodies::Said;
 use crate::rays::is_aimed;
 use crate::truth::{Crossing, World};
 use mica_render::OcclusionBackend;
@@ -176,16 +176,13 @@ fn hit(world: &World, ray: &Ray, body: usize, of: OcclusionBackend, said: &Said,
 mod tests {
     use super::*;
     use crate::rays::ray;
-    use crate::{meshes, scenes, shapes};
+    use crate::{meshes, scenes};
     use glam::DVec3;
     use mica_shaders::types::RayAnswer;
 
     /// One triangle before another one, the right answer of a ray onto both, and the ray.
     fn example() -> (World, Ray, Said) {
-        let scene = scenes::alone(
-            "two",
-            meshes::joined(shapes::identical(1), shapes::identical(1).map(|point| point - DVec3::Z)),
-        );
+        let scene = scenes::alone("two", meshes::identical(1).and(meshes::identical(1).map(|point| point - DVec3::Z)));
         let world = World::new(&scene, DVec3::ZERO);
         let ray = ray(DVec3::new(0.05, -0.04, 2.0), DVec3::new(0.0, 0.0, -1.0));
         let found = world.crossing(0, &ray, OcclusionBackend::Bvh);
@@ -243,7 +240,7 @@ mod tests {
     #[test]
     fn what_f32_cannot_decide_is_a_tie() {
         let (world, _, right) = example();
-        let [corner, ..] = shapes::identical(1).corners(0);
+        let [corner, ..] = meshes::identical(1).corners(0);
         let grazing = ray(corner + DVec3::Z, DVec3::new(0.0, 0.0, -1.0));
         let found = world.crossing(0, &grazing, OcclusionBackend::Bvh);
         let hit = RayAnswer { t: found.t as f32, barycentrics: [0.0; 2], ..right.closest };

@@ -1,14 +1,183 @@
-//! Meshes beside those of the hierarchy's own tests.
+//! Meshes that are hard to build over or to hit.
 
-use crate::shapes::{Mesh, Random};
+use crate::random::Random;
 use glam::{DQuat, DVec3};
+use std::collections::HashMap;
 
-/// Both as one mesh.
-pub fn joined(mut mesh: Mesh, other: Mesh) -> Mesh {
-    let base = mesh.positions.len() as u32;
-    mesh.positions.extend(other.positions);
-    mesh.indices.extend(other.indices.iter().map(|vertex| vertex + base));
-    mesh
+/// Positions, and indices of three for each triangle.
+#[derive(Clone, Default)]
+pub struct Mesh {
+    pub positions: Vec<[f32; 3]>,
+    pub indices: Vec<u32>,
+}
+
+impl Mesh {
+    /// Of triangles that share no vertex.
+    pub fn soup(triangles: impl IntoIterator<Item = [DVec3; 3]>) -> Self {
+        let positions: Vec<[f32; 3]> =
+            triangles.into_iter().flatten().map(|corner| corner.as_vec3().to_array()).collect();
+        let indices = (0..positions.len() as u32).collect();
+        Self { positions, indices }
+    }
+
+    /// This one's triangles, then the other's.
+    pub fn and(mut self, other: Self) -> Self {
+        let first = self.positions.len() as u32;
+        self.positions.extend(other.positions);
+        self.indices.extend(other.indices.iter().map(|vertex| vertex + first));
+        self
+    }
+
+    pub fn triangles(&self) -> usize {
+        self.indices.len() / 3
+    }
+
+    /// The corners of a triangle, exactly.
+    pub fn corners(&self, triangle: usize) -> [DVec3; 3] {
+        std::array::from_fn(|k| DVec3::from(self.positions[self.indices[3 * triangle + k] as usize].map(f64::from)))
+    }
+
+    /// Each position moved, then rounded to f32.
+    pub fn map(mut self, to: impl Fn(DVec3) -> DVec3) -> Self {
+        for position in &mut self.positions {
+            *position = to(DVec3::from(position.map(f64::from))).as_vec3().to_array();
+        }
+        self
+    }
+}
+
+/// Every shape, with a name for messages.
+pub fn all() -> Vec<(&'static str, Mesh)> {
+    vec![
+        ("empty", Mesh::default()),
+        ("one", identical(1)),
+        ("two", random_triangles(2, 0.8, 3)),
+        ("identical", identical(10_000)),
+        ("collinear centroids", collinear_centroids(1_000)),
+        ("long sticks", long_sticks(2_000)),
+        ("shrinking", shrinking(400)),
+        ("60 nested boxes", nested_boxes(60)),
+        ("stick of 1e6", stick_of_1e6()),
+        ("soup", random_triangles(5_000, 0.05, 5)),
+        ("icosphere", bumpy_icosphere(4)),
+    ]
+}
+
+/// A closed sphere of radius about 1 with bumps: 20 * 4^levels triangles.
+pub fn bumpy_icosphere(levels: u32) -> Mesh {
+    let golden = (1.0 + 5.0f64.sqrt()) / 2.0;
+    let mut points: Vec<DVec3> = Vec::new();
+    for (one, long) in [(-1.0, golden), (1.0, golden), (-1.0, -golden), (1.0, -golden)] {
+        points.extend([DVec3::new(one, long, 0.0), DVec3::new(0.0, one, long), DVec3::new(long, 0.0, one)]);
+    }
+    // The faces of an icosahedron are the triples of vertices that are all neighbours, at distance 2.
+    let near = |a: usize, b: usize| (points[a].distance(points[b]) - 2.0).abs() < 1e-6;
+    let mut faces: Vec<[usize; 3]> = Vec::new();
+    for a in 0..12 {
+        for b in a + 1..12 {
+            faces.extend((b + 1..12).filter(|&c| near(a, b) && near(b, c) && near(a, c)).map(|c| [a, b, c]));
+        }
+    }
+    for _ in 0..levels {
+        let mut middles = HashMap::new();
+        let mut middle = |a: usize, b: usize| {
+            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                points.push(points[a].normalize() + points[b].normalize());
+                points.len() - 1
+            })
+        };
+        faces = faces
+            .iter()
+            .flat_map(|&[a, b, c]| {
+                let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+                [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+            })
+            .collect();
+    }
+    let positions = points
+        .iter()
+        .map(|point| {
+            let unit = point.normalize();
+            let bump = (13.0 * unit.x).sin() * (11.0 * unit.y).sin() * (17.0 * unit.z + 1.0).sin();
+            (unit * (1.0 + 0.1 * bump)).as_vec3().to_array()
+        })
+        .collect();
+    Mesh { positions, indices: faces.iter().flatten().map(|&vertex| vertex as u32).collect() }
+}
+
+/// Triangles of like size at random places in the cube of half extent 1.
+pub fn random_triangles(count: usize, size: f64, seed: u64) -> Mesh {
+    let mut random = Random::new(seed);
+    Mesh::soup((0..count).map(|_| {
+        let place = random.point();
+        [(); 3].map(|()| place + size * random.point())
+    }))
+}
+
+/// So many times the same triangle, tilted against all axes.
+pub fn identical(count: usize) -> Mesh {
+    let triangle = [DVec3::new(-0.6, -0.5, 0.1), DVec3::new(0.7, -0.4, 0.3), DVec3::new(0.1, 0.8, -0.6)];
+    Mesh::soup(std::iter::repeat_n(triangle, count))
+}
+
+/// Triangles whose centroids lie on a line along x.
+pub fn collinear_centroids(count: usize) -> Mesh {
+    Mesh::soup((0..count).map(|k| {
+        let centre = DVec3::X * (2.0 * k as f64 / count as f64 - 1.0);
+        let size = 0.1 + 0.4 * (k % 7) as f64 / 7.0;
+        [DVec3::new(0.0, size, 0.0), DVec3::new(0.0, -size / 2.0, size), DVec3::new(0.0, -size / 2.0, -size)]
+            .map(|corner| centre + corner)
+    }))
+}
+
+/// Triangles a thousand times longer than wide, in all directions through the cube.
+pub fn long_sticks(count: usize) -> Mesh {
+    let mut random = Random::new(11);
+    Mesh::soup((0..count).map(|_| {
+        let (end, other) = (random.point(), random.point());
+        [end, other, end + 1e-3 * random.point()]
+    }))
+}
+
+/// Triangles in a row towards the origin, over ten octaves of sizes: the heuristic peels off the largest, level by level.
+pub fn shrinking(count: usize) -> Mesh {
+    Mesh::soup((0..count).map(|k| {
+        let size = 2.0 * 0.5f64.powf(10.0 * k as f64 / count as f64);
+        [DVec3::ZERO, DVec3::X, DVec3::Y].map(|corner| size * (DVec3::ONE + 0.2 * corner))
+    }))
+}
+
+/// A triangle along x, 1e6 long and 1 wide, between small ones at its ends and beside its middle.
+pub fn stick_of_1e6() -> Mesh {
+    let [left, right] = [-5e5, 5e5].map(|x| x * DVec3::X);
+    let beside = |place: DVec3, seed| random_triangles(100, 20.0, seed).map(|corner| place + 40.0 * DVec3::Y + corner);
+    let stick = Mesh::soup([[left, right, right + DVec3::Y]]);
+    stick.and(beside(left, 61)).and(beside(DVec3::ZERO, 62)).and(beside(right, 63))
+}
+
+/// Needles of 1 : 25,000, within the cube of half extent 1.
+pub fn needles(count: usize) -> Mesh {
+    let mut random = Random::new(5);
+    Mesh::soup((0..count).map(|_| {
+        let (at, along, across) = (random.point(), random.direction(), random.direction());
+        [at, at + 0.5 * along, at + 0.25 * along + 2e-5 * across].map(|corner| 0.5 * corner)
+    }))
+}
+
+/// A floor of large tiles, its lines at coordinates with all their bits in use, turned so that `up` is the axis of its
+/// normal. Its boxes end where its seams are.
+pub fn tiles(up: usize) -> Mesh {
+    let mut random = Random::new(4);
+    let mut lines = [0.0; 9];
+    for (k, line) in lines.iter_mut().enumerate() {
+        *line = f64::from((k as f64 - 4.0 + random.between(-0.3, 0.3)) as f32);
+    }
+    let turned = |x, y| [DVec3::new(0.0, x, y), DVec3::new(y, 0.0, x), DVec3::new(x, y, 0.0)][up];
+    Mesh::soup((0..128).map(|k| {
+        let (x, y, upper) = (k / 2 % 8, k / 16, k % 2 == 1);
+        let corner = |i: usize, j: usize| turned(lines[x + i], lines[y + j]);
+        if upper { [corner(1, 0), corner(1, 1), corner(0, 1)] } else { [corner(0, 0), corner(1, 0), corner(0, 1)] }
+    }))
 }
 
 /// Triangles of like size at random places in the cube of half extent 1, neighbours near each other: lavapipe's own
@@ -31,7 +200,7 @@ pub fn nested_boxes(count: u32) -> Mesh {
     for depth in 0..count {
         // Every other box stands along the axes, so that rays along them graze its sides.
         let turn = if depth % 2 == 0 { DQuat::IDENTITY } else { turn };
-        mesh = joined(mesh, cube().map(|corner| 0.8f64.powi(depth as i32) * (turn * corner)));
+        mesh = mesh.and(cube().map(|corner| 0.8f64.powi(depth as i32) * (turn * corner)));
     }
     mesh
 }

@@ -1,6 +1,6 @@
 //! Rays of every kind that a scene may be asked about.
 
-use crate::shapes::Random;
+use crate::random::Random;
 use crate::truth::World;
 use glam::DVec3;
 use mica_shaders::types::Ray;
@@ -11,8 +11,14 @@ const BATCH: usize = 4096;
 
 /// A place in a triangle, all equally likely.
 pub fn within(random: &mut Random, [a, b, c]: [DVec3; 3]) -> DVec3 {
+    let [second, third] = weights(random);
+    a + second * (b - a) + third * (c - a)
+}
+
+/// Weights of the second and the third corner of such a place.
+pub fn weights(random: &mut Random) -> [f64; 2] {
     let (u, v) = (random.unit().sqrt(), random.unit());
-    a + u * (1.0 - v) * (b - a) + u * v * (c - a)
+    [u * (1.0 - v), u * v]
 }
 
 /// An endless ray, in scene space.

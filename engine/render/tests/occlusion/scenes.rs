@@ -1,7 +1,7 @@
 //! The scenes that are asked about: those of the program, and garbage.
 
-use crate::meshes;
-use crate::shapes::{self, Mesh, Random};
+use crate::meshes::{self, Mesh};
+use crate::random::Random;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use mica_render::EMBEDDED_SCENES;
 use mica_render::scene::{self, Instance, Material, Scene};
@@ -36,35 +36,49 @@ pub fn embedded() -> Vec<Scene> {
 
 /// Scenes that no artist would make on purpose, less those with more copies of a triangle than a ray may test.
 pub fn garbage() -> Vec<Scene> {
-    let mut scenes: Vec<Scene> = shapes::all()
+    let mut scenes: Vec<Scene> = meshes::all()
         .into_iter()
         .filter(|(name, _)| !["identical", "soup"].contains(name))
         .map(|(name, mesh)| alone(name, mesh))
         .collect();
-    let sphere = || shapes::bumpy_icosphere(3);
+    let sphere = || meshes::bumpy_icosphere(3);
     let far = DVec3::new(1.48e5, 1234.0, -2.23e5);
     scenes.extend([
         alone("nothing but vertices", Mesh { positions: vec![[0.0; 3], [1.0; 3]], indices: Vec::new() }),
         alone("soup", meshes::soup(5_000, 0.05, 5)),
-        alone("copies", meshes::joined(shapes::identical(30), meshes::soup(500, 0.3, 37))),
+        alone("copies", meshes::identical(30).and(meshes::soup(500, 0.3, 37))),
         alone("coordinates of 1e-4", meshes::soup(2_000, 0.1, 41).map(|point| 1e-4 * point)),
         alone("coordinates of 1e6", meshes::soup(2_000, 0.1, 43).map(|point| 1e6 * point)),
         alone("from 1e-4 to 1e6", meshes::of_all_sizes(2_000)),
-        alone("60 nested boxes", meshes::nested_boxes(60)),
         alone("without area", meshes::without_area(2_000)),
         alone("grid", meshes::grid(64)),
         alone("in one plane", meshes::in_one_plane(40)),
-        of("twelve instances", vec![sphere()], &shapes::twelve_places()),
-        of("a hundred instances", vec![shapes::bumpy_icosphere(2)], &scattered(100, 47)),
+        of("twelve instances", vec![sphere()], &twelve_places()),
+        of("a hundred instances", vec![meshes::bumpy_icosphere(2)], &scattered(100, 47)),
         of("mirrored", vec![sphere()], &[(0, DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0)))]),
         of("scaled along the axes", vec![sphere()], &[(0, DAffine3::from_scale(DVec3::new(1e-3, 20.0, -1.0)))]),
         of("flattened", vec![sphere(), meshes::cube()], &flattened()),
         of("skewed", vec![sphere(), meshes::cube()], &skewed()),
         of("far from its own origin", vec![sphere().map(|point| point + far)], &brought_back(far)),
         of("huge and tiny", vec![meshes::cube(), sphere()], &huge_and_tiny()),
-        of("mixed", vec![sphere(), Mesh::default(), meshes::cube(), shapes::long_sticks(300)], &mixed()),
+        of("mixed", vec![sphere(), Mesh::default(), meshes::cube(), meshes::long_sticks(300)], &mixed()),
     ]);
     scenes
+}
+
+/// Twelve placements of one mesh: turned, scaled by different factors along its axes, every third one mirrored.
+pub fn twelve_places() -> Vec<(usize, DAffine3)> {
+    let mut random = Random::new(7);
+    (0..12)
+        .map(|k| {
+            let mirror = if k % 3 == 0 { -1.0 } else { 1.0 };
+            let scale =
+                DVec3::new(random.between(0.2, 0.5), mirror * random.between(0.2, 0.5), random.between(0.2, 0.5));
+            let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, 6.0));
+            let place = DVec3::new((k % 4) as f64 - 1.5, (k / 4) as f64 - 1.0, random.between(-0.5, 0.5));
+            (0, DAffine3::from_scale_rotation_translation(scale, turn, place))
+        })
+        .collect()
 }
 
 fn scattered(count: usize, seed: u64) -> Vec<(usize, DAffine3)> {

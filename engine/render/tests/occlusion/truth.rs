@@ -6,7 +6,7 @@
 //! for each operation of f32, [`PLACING`] of them for the ray's way into the mesh. What lies within the bound f32
 //! cannot decide; what lies outside it, it must get right.
 
-use crate::driver;
+use crate::driver_inverse;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use mica_render::OcclusionBackend;
 use mica_render::scene::bvh::Placements;
@@ -156,8 +156,7 @@ impl World {
 
     /// Whether a triangle is there where a ray crosses it.
     pub fn is_there(&self, triangle: u32, crossing: &Crossing) -> Option<bool> {
-        let instance = self.instance[triangle as usize] as usize;
-        let of_mesh = triangle as usize - self.places[instance].first;
+        let (instance, of_mesh) = self.in_mesh(triangle);
         self.masks.as_ref().map_or(Some(true), |masks| masks(instance, of_mesh, crossing))
     }
 
@@ -174,6 +173,12 @@ impl World {
     /// The corners of a triangle, in scene space.
     pub fn triangle(&self, triangle: usize) -> [DVec3; 3] {
         self.scene[triangle]
+    }
+
+    /// The instance of a triangle, and which one of its mesh it is.
+    pub fn in_mesh(&self, triangle: u32) -> (usize, usize) {
+        let instance = self.instance[triangle as usize] as usize;
+        (instance, triangle as usize - self.places[instance].first)
     }
 
     /// The first triangle of the same instance with the same corners.
@@ -249,7 +254,7 @@ impl Place {
         let by_bvh = Placing { per_unit: back, fixed: local_from_scene.translation.abs() };
         // A driver is given the rounded placement, to which |M| |W| |M| is what its inverse is sensitive, and inverts it in
         // f32 itself.
-        let per_unit = back * there * back + driver::inverse_error(scene_from_local);
+        let per_unit = back * there * back + driver_inverse::inverse_error(scene_from_local);
         let by_driver = Placing { per_unit, fixed: per_unit * scene_from_local.translation.abs() };
         Self { scene_from_local, local_from_scene, in_scene_space, by_bvh, by_driver, first }
     }

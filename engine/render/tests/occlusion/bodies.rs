@@ -49,7 +49,7 @@ impl Bodies {
 
     /// Asserts that ray queries are refused, in words.
     fn is_refused(&mut self) {
-        let scene = crate::scenes::alone("one", crate::shapes::identical(1));
+        let scene = crate::scenes::alone("one", crate::meshes::identical(1));
         let renderer = Renderer::new(scene, &[], None, OcclusionBackend::RayQuery);
         let mut renderer = renderer.expect("a renderer");
         let mut graph = Graph::new();

@@ -1,9 +1,9 @@
 //! What is a ray, where it ends, and what is said of one that meets nothing.
 
-use crate::device::{Asked, Bodies, Said};
+use crate::bodies::{Asked, Bodies, Said};
+use crate::meshes::{self, Mesh};
 use crate::rays::ray;
-use crate::shapes::{self, Mesh};
-use crate::{meshes, scenes};
+use crate::scenes;
 use glam::{DAffine3, DVec3};
 use mica_render::scene::Scene;
 use mica_shaders::types::{Ray, RayAnswer};
@@ -19,7 +19,7 @@ fn asked(scene: &Scene, rays: &[Ray]) -> Vec<Asked> {
 fn a_hit_lies_strictly_between_the_ends_and_counts_in_lengths_of_the_direction() {
     let square = Mesh::soup([[DVec3::new(-1.0, -1.0, 2.0), DVec3::new(3.0, -1.0, 2.0), DVec3::new(-1.0, 3.0, 2.0)]]);
     // A second triangle far away, so that scene space is where the mesh is.
-    let mesh = meshes::joined(square.clone(), square.map(|point| -point));
+    let mesh = square.clone().and(square.map(|point| -point));
     let span = |t_min, t_max, length| Ray { t_min, t_max, ..ray(DVec3::ZERO, length * DVec3::Z) };
     let cases = [
         (span(0.0, 1e30, 1.0), Some(2.0)),
@@ -49,7 +49,7 @@ fn a_hit_lies_strictly_between_the_ends_and_counts_in_lengths_of_the_direction()
 
 #[test]
 fn a_miss_leaves_the_far_end_and_zeros() {
-    let scene = scenes::alone("one", shapes::identical(1));
+    let scene = scenes::alone("one", meshes::identical(1));
     for Asked { of, said, .. } in asked(&scene, &[ray(DVec3::splat(9.0), DVec3::X)]) {
         assert_eq!(said[0].closest, RayAnswer { t: 1e30, ..RayAnswer::default() }, "{of:?}");
     }
@@ -70,7 +70,7 @@ fn rays_that_are_none_meet_nothing_and_do_not_count() {
     rays.extend([Ray { t_max: f32::NAN, ..ray(DVec3::ZERO, good) }, Ray { t_min: f32::NAN, ..ray(DVec3::ZERO, good) }]);
     let none = rays.len();
     rays.push(ray(DVec3::ZERO, good));
-    for Asked { of, said, traced, cut_short } in asked(&scenes::alone("sphere", shapes::bumpy_icosphere(3)), &rays) {
+    for Asked { of, said, traced, cut_short } in asked(&scenes::alone("sphere", meshes::bumpy_icosphere(3)), &rays) {
         assert!(said[..none].iter().all(|said| said.closest.blocked == 0), "{of:?}: {said:?}");
         assert!(said[none].closest.blocked != 0, "{of:?}: a ray from inside");
         assert_eq!((traced, cut_short), (2, 0), "{of:?}: one ray, asked twice");
@@ -84,8 +84,8 @@ fn rays_that_are_none_meet_nothing_and_do_not_count() {
 fn a_hundred_thousand_copies_answer_as_one_does() {
     let wall = || meshes::grid(1).map(|point| 3.0 * point - 2.0 * DVec3::Z);
     let places = [(0, DAffine3::IDENTITY), (1, DAffine3::IDENTITY)];
-    let [one, many] = [1, 100_000].map(|copies| scenes::of("copies", vec![shapes::identical(copies), wall()], &places));
-    let triangle = shapes::identical(1).corners(0);
+    let [one, many] = [1, 100_000].map(|copies| scenes::of("copies", vec![meshes::identical(copies), wall()], &places));
+    let triangle = meshes::identical(1).corners(0);
     let middle = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
     let center = one.bounds().expect("a box").center();
     let targets = [middle, triangle[0].lerp(middle, 0.1), DVec3::new(0.6, 0.7, -0.5), DVec3::new(-0.5, 0.7, 0.2)];

@@ -1,15 +1,21 @@
-//! What the host builds: structure, depth, quality, determinism and refusals.
+//! What the host builds over a mesh: structure, depth, quality, copies, progress, determinism and refusals.
 
-use crate::shapes::{self, Mesh};
-use glam::{DAffine3, DMat3, DVec3};
+use crate::meshes::{self, Mesh};
+use crate::scenes;
+use glam::DVec3;
 use mica_render::scene::bvh::{
     Bounds, BuildOptions, BvhError, LEAF_TRIANGLES, MeshBvh, SceneBvh, children, leaf_range,
 };
-use mica_shaders::constants::{BVH_LEAF, BVH_MESH_LEVELS, BVH_NOTHING, BVH_SCENE_LEVELS};
+use mica_shaders::constants::{BVH_LEAF, BVH_MESH_LEVELS, BVH_NOTHING};
 use mica_shaders::types::{BvhNode, BvhTriangle};
+use std::sync::atomic::{AtomicU64, Ordering};
 
-fn built(mesh: &Mesh) -> MeshBvh {
-    MeshBvh::build(&mesh.positions, &mesh.indices).expect("a usable mesh")
+pub fn built(mesh: &Mesh) -> MeshBvh {
+    built_with(mesh, BuildOptions::default())
+}
+
+fn built_with(mesh: &Mesh, options: BuildOptions) -> MeshBvh {
+    MeshBvh::build_with(&mesh.positions, &mesh.indices, options).expect("a usable mesh")
 }
 
 /// Calls `visit` with every reference below `reference`, its box as its parent has it, and its depth.
@@ -22,13 +28,15 @@ fn walk(nodes: &[BvhNode], reference: u32, bounds: Bounds, depth: u32, visit: &m
     }
 }
 
+/// The box of a triangle.
 fn of_triangle(triangle: &BvhTriangle) -> Bounds {
     [triangle.a, triangle.b, triangle.c]
         .into_iter()
         .fold(Bounds::EMPTY, |bounds, corner| bounds.union(Bounds::of_point(corner)))
 }
 
-fn depth(bvh: &MeshBvh) -> u32 {
+/// How many nodes lie above the deepest leaf.
+pub fn depth(bvh: &MeshBvh) -> u32 {
     let mut deepest = 0;
     walk(bvh.nodes(), bvh.root(), bvh.bounds(), 0, &mut |_, _, depth| deepest = deepest.max(depth));
     deepest
@@ -36,7 +44,7 @@ fn depth(bvh: &MeshBvh) -> u32 {
 
 #[test]
 fn every_triangle_is_in_exactly_one_leaf_and_unchanged() {
-    for (name, mesh) in shapes::all() {
+    for (name, mesh) in meshes::all() {
         let bvh = built(&mesh);
         let mut seen = vec![0; mesh.triangles()];
         walk(bvh.nodes(), bvh.root(), bvh.bounds(), 0, &mut |reference, _, _| {
@@ -58,7 +66,7 @@ fn every_triangle_is_in_exactly_one_leaf_and_unchanged() {
 
 #[test]
 fn every_node_is_reached_once_and_every_box_encloses_what_is_below_it() {
-    for (name, mesh) in shapes::all() {
+    for (name, mesh) in meshes::all() {
         let bvh = built(&mesh);
         let mut reached = 0;
         walk(bvh.nodes(), bvh.root(), bvh.bounds(), 0, &mut |reference, bounds, _| {
@@ -81,7 +89,7 @@ fn every_node_is_reached_once_and_every_box_encloses_what_is_below_it() {
 fn an_empty_mesh_has_no_root_and_a_single_triangle_no_node() {
     let empty = built(&Mesh::default());
     assert_eq!((empty.root(), empty.nodes().len(), empty.triangles().len()), (BVH_NOTHING, 0, 0));
-    let one = built(&shapes::identical(1));
+    let one = built(&meshes::identical(1));
     assert_eq!((leaf_range(one.root()), one.nodes().len()), (Some((0, 1)), 0));
 }
 
@@ -89,7 +97,7 @@ fn an_empty_mesh_has_no_root_and_a_single_triangle_no_node() {
 /// sizes split off one octave or two at each level.
 #[test]
 fn no_path_is_longer_than_a_traversals_stack_allows() {
-    for (name, mesh) in shapes::all() {
+    for (name, mesh) in meshes::all() {
         assert!(depth(&built(&mesh)) <= BVH_MESH_LEVELS, "{name}");
     }
     let octaves = Mesh::soup((0..640).map(|k| {
@@ -103,9 +111,8 @@ fn no_path_is_longer_than_a_traversals_stack_allows() {
 /// Masks may differ between them, so they are all kept.
 #[test]
 fn a_hundred_thousand_masked_triangles_in_one_place_split_in_halves() {
-    let mesh = shapes::identical(100_000);
-    let options = BuildOptions { masked: true, ..BuildOptions::default() };
-    let bvh = MeshBvh::build_with(&mesh.positions, &mesh.indices, options).expect("a usable mesh");
+    let mesh = meshes::identical(100_000);
+    let bvh = built_with(&mesh, BuildOptions { masked: true, ..BuildOptions::default() });
     assert_eq!((depth(&bvh), bvh.triangles().len()), (15, 100_000), "25,000 leaves of 4");
 }
 
@@ -138,16 +145,13 @@ fn cost_of_halving(triangles: &mut [(DVec3, Bounds)], root: &Bounds) -> f64 {
 #[test]
 fn the_tree_costs_clearly_less_than_one_of_halves() {
     // A dense small sphere inside a sparse large one: halves follow the counts, good planes the empty space.
-    let mut nested = shapes::bumpy_icosphere(2).map(|point| 100.0 * point);
-    let dense = shapes::bumpy_icosphere(4).map(|point| point + DVec3::new(30.0, 20.0, 10.0));
-    let base = nested.positions.len() as u32;
-    nested.positions.extend(&dense.positions);
-    nested.indices.extend(dense.indices.iter().map(|vertex| vertex + base));
+    let sparse = meshes::bumpy_icosphere(2).map(|point| 100.0 * point);
+    let dense = meshes::bumpy_icosphere(4).map(|point| point + DVec3::new(30.0, 20.0, 10.0));
     let cases = [
-        ("icosphere", shapes::bumpy_icosphere(5), 0.88),
-        ("soup", shapes::random_triangles(20_000, 0.05, 5), 0.85),
-        ("sticks", shapes::long_sticks(2_000), 0.86),
-        ("nested", nested, 0.6),
+        ("icosphere", meshes::bumpy_icosphere(5), 0.88),
+        ("soup", meshes::random_triangles(20_000, 0.05, 5), 0.85),
+        ("sticks", meshes::long_sticks(2_000), 0.86),
+        ("nested", sparse.and(dense), 0.6),
     ];
     for (name, mesh, most) in cases {
         let bvh = built(&mesh);
@@ -168,7 +172,7 @@ fn the_tree_costs_clearly_less_than_one_of_halves() {
 
 #[test]
 fn the_tree_does_not_depend_on_the_number_of_threads() {
-    let mesh = shapes::bumpy_icosphere(6);
+    let mesh = meshes::bumpy_icosphere(6);
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| built(&mesh))
@@ -196,88 +200,31 @@ fn unusable_meshes_are_refused_with_the_place_of_the_fault() {
 }
 
 #[test]
-fn unusable_scenes_are_refused_with_the_place_of_the_fault() {
-    let meshes = [built(&shapes::identical(1))];
-    let refused = |instance| SceneBvh::build(&[(0, DAffine3::IDENTITY), instance], &meshes).expect_err("a refusal");
-    let expected = BvhError::NoSuchMesh { instance: 1, mesh: 2, meshes: 1 };
-    assert_eq!(refused((2, DAffine3::IDENTITY)), expected);
-    for far in [DVec3::splat(f64::NAN), DVec3::X * 1e13, DVec3::X * f64::INFINITY] {
-        assert_eq!(refused((0, DAffine3::from_translation(far))), BvhError::BadTransform { instance: 1 });
+fn progress_ends_at_the_number_of_triangles_and_of_instances() {
+    for mesh in [Mesh::default(), meshes::random_triangles(3, 0.1, 1), meshes::random_triangles(50_000, 0.1, 2)] {
+        let placed = AtomicU64::new(0);
+        let bvh = built_with(&mesh, BuildOptions { placed: Some(&placed), ..BuildOptions::default() });
+        assert_eq!(placed.load(Ordering::Relaxed), mesh.triangles() as u64);
+        let placed = AtomicU64::new(0);
+        SceneBvh::build_with(&scenes::twelve_places(), &[bvh], Some(&placed)).expect("a usable scene");
+        assert_eq!(placed.load(Ordering::Relaxed), 12);
     }
 }
 
+/// Of copies in one place the first is kept; where masks may tell them apart, of those that share their vertices.
 #[test]
-fn a_scene_without_triangles_still_fills_its_buffers() {
-    let empty = built(&Mesh::default());
-    for instances in [vec![], vec![(0, DAffine3::IDENTITY); 3]] {
-        let scene = SceneBvh::build(&instances, std::slice::from_ref(&empty)).expect("a scene");
-        assert_eq!(scene.instances.len(), instances.len() + 1);
-        assert_eq!(scene.instances[0].root, BVH_NOTHING);
-        assert_eq!((scene.nodes.len(), scene.triangles.len()), (1, 1), "one unused element each");
-    }
-}
-
-/// Corners moved to scene space in f64 lie inside, strictly where the transform is inexact; the mesh is stored once.
-#[test]
-fn the_boxes_of_instances_enclose_them_in_scene_space() {
-    let mesh = shapes::bumpy_icosphere(3);
-    let instances = shapes::twelve_places();
-    let bvh = built(&mesh);
-    let scene = SceneBvh::build(&instances, std::slice::from_ref(&bvh)).expect("a scene");
-    assert_eq!(scene.triangles.len(), mesh.triangles());
-    assert_eq!(scene.nodes.len(), bvh.nodes().len() + instances.len() - 1);
-
-    let mut seen = vec![0; instances.len()];
-    let mut deepest = 0;
-    fn below(
-        scene: &SceneBvh,
-        reference: u32,
-        bounds: Option<Bounds>,
-        depth: u32,
-        visit: &mut impl FnMut(usize, Bounds, u32),
-    ) {
-        match (leaf_range(reference), bounds) {
-            (Some((instance, _)), Some(bounds)) => visit(instance as usize - 1, bounds, depth),
-            _ => children(&scene.nodes[reference as usize])
-                .into_iter()
-                .for_each(|(child, bounds)| below(scene, child, Some(bounds), depth + 1, visit)),
-        }
-    }
-    below(&scene, scene.instances[0].root, None, 0, &mut |instance, bounds, depth| {
-        seen[instance] += 1;
-        deepest = deepest.max(depth);
-        for triangle in 0..mesh.triangles() {
-            for corner in mesh.corners(triangle) {
-                let place = instances[instance].1.transform_point3(corner);
-                for axis in 0..3 {
-                    let inside =
-                        f64::from(bounds.lower[axis]) < place[axis] && place[axis] < f64::from(bounds.upper[axis]);
-                    assert!(inside, "instance {instance}: {place} is not in {bounds:?}");
-                }
-            }
-        }
-    });
-    assert!(seen.iter().all(|&times| times == 1), "{seen:?}");
-    assert!(deepest <= BVH_SCENE_LEVELS);
-}
-
-/// A flattened mesh is still seen: its corners are stored where they are. So is one so skewed that f32 would lose it.
-#[test]
-fn instances_without_a_usable_inverse_are_stored_in_scene_space() {
-    let mesh = shapes::bumpy_icosphere(2);
-    let flat = DAffine3::from_scale(DVec3::new(1.0, 0.0, 2.0));
-    let skewed = DAffine3::from_mat3(DMat3::from_cols(DVec3::X, DVec3::new(1.0, 1e-4, 0.0), DVec3::Z));
-    let plain = DAffine3::from_scale(DVec3::new(1e-6, 1.0, -3.0));
-    let instances = [(0, plain), (0, flat), (0, skewed)];
-    let scene = SceneBvh::build(&instances, &[built(&mesh)]).expect("a scene");
-    assert_eq!(scene.triangles.len(), 3 * mesh.triangles());
-    let identity = scene.instances[0].local_from_scene;
-    assert_ne!(scene.instances[1].local_from_scene, identity, "scales along the axes lose nothing");
-    assert_eq!(scene.instances[2].local_from_scene, identity);
-    assert_eq!(scene.instances[3].local_from_scene, identity);
-    let flattened = &scene.triangles[mesh.triangles()..2 * mesh.triangles()];
-    for triangle in flattened {
-        let [a, ..] = mesh.corners(triangle.index as usize);
-        assert_eq!(triangle.a, flat.transform_point3(a).as_vec3().to_array());
-    }
+fn copies_are_dropped_where_rays_cannot_tell_them_apart() {
+    let apart = meshes::identical(1_000).and(meshes::random_triangles(50, 0.1, 3));
+    let kept = |mesh: &Mesh, masked| {
+        let bvh = built_with(mesh, BuildOptions { masked, ..BuildOptions::default() });
+        let mut indices: Vec<u32> = bvh.triangles().iter().map(|triangle| triangle.index).collect();
+        indices.sort_unstable();
+        indices
+    };
+    let distinct: Vec<u32> = std::iter::once(0).chain(1_000..1_050).collect();
+    assert_eq!(kept(&apart, false), distinct);
+    assert_eq!(kept(&apart, true).len(), 1_050);
+    let mut shared = apart;
+    shared.indices[..3_000].iter_mut().zip([0, 1, 2].into_iter().cycle()).for_each(|(index, vertex)| *index = vertex);
+    assert_eq!(kept(&shared, true), distinct);
 }

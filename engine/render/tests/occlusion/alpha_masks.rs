@@ -1,13 +1,19 @@
 //! What alpha masks cut out does not block, and whatever is behind it does: alike by both bodies, and as f64 has it.
 
+use crate::bodies::{Bodies, Said};
+use crate::bvh_tracer::BvhTracer;
 use crate::compare::{Answers, compare};
-use crate::device::Bodies;
-use crate::rays::of_every_kind;
-use crate::shapes::{Mesh, Random};
+use crate::mesh_hierarchy::built;
+use crate::meshes::{self, Mesh};
+use crate::random::Random;
+use crate::rays::{many, of_every_kind, ray};
+use crate::scenes;
 use crate::truth::{Crossing, U, World};
-use crate::{meshes, scenes, shapes};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
+use mica_render::OcclusionBackend;
+use mica_render::scene::bvh::SceneBvh;
 use mica_render::scene::{AlphaMode, Encoding, Material, Scene, Texture, TextureRef, Wrap};
+use mica_shaders::types::Ray;
 
 const RAYS: usize = 1 << 16;
 const SIDE: u32 = 8;
@@ -103,7 +109,7 @@ fn masks_are_cut_alike_by_both_bodies_and_as_f64_has_them() {
     for (name, scene) in [
         ("nearest", perforated(meshes::grid(6), &[layers.clone(), vec![leaning]].concat(), true, false)),
         ("linear", perforated(meshes::grid(6), &[layers, vec![leaning]].concat(), false, false)),
-        ("vertex colours", perforated(shapes::bumpy_icosphere(2), &[leaning, DAffine3::IDENTITY], false, true)),
+        ("vertex colours", perforated(meshes::bumpy_icosphere(2), &[leaning, DAffine3::IDENTITY], false, true)),
     ] {
         let mut renderers = bodies.open(&scene);
         let masks = scene.clone();
@@ -121,4 +127,48 @@ fn masks_are_cut_alike_by_both_bodies_and_as_f64_has_them() {
         let whole = compare(&World::new(&scene, renderers[0].scene_center()), &rays, &said, 1);
         assert!(whole.wrong.iter().all(|&wrong| wrong > RAYS / 20), "{name}: {:?}", whole.wrong);
     }
+}
+
+/// Whole triangles and parts of others are holes; the rule depends on all that the hierarchy's walk passes on.
+const RULE: &str = "
+bool is_covered(uint instance, uint triangle, vec2 barycentrics) {
+  return (instance + triangle) % 3u != 0u && barycentrics.x + 0.5 * barycentrics.y > 0.4;
+}
+";
+
+#[test]
+fn a_mask_is_asked_about_the_instance_the_triangle_and_the_place_in_it() {
+    let scene = scenes::of("soup", vec![meshes::random_triangles(300, 0.4, 31)], &scenes::twelve_places());
+    let whole = || World::new(&scene, scene.bounds().expect("a box").center());
+    let world = whole().with_masks(|instance, triangle, crossing| {
+        let [second, third] = crossing.barycentrics;
+        let inside = second + 0.5 * third - 0.4;
+        let sure = inside.abs() > 2.0 * crossing.barycentrics_error + 1e-6;
+        if (instance + triangle).is_multiple_of(3) { Some(false) } else { sure.then_some(inside > 0.0) }
+    });
+    let rays = many(5_000, 32, |random, _| ray(1.5 * random.point(), random.direction()));
+    let said = [(OcclusionBackend::Bvh, BvhTracer::masked(RULE).ask(&scene, &rays))];
+    let tally = compare(&world, &rays, &said, 1);
+    tally.expect_right("holes by rule");
+    let through = compare(&whole(), &rays, &said, 1).wrong[0];
+    println!("of {} rays {through} pass through a hole first, {} hit", rays.len(), tally.hits);
+    assert!(through > 800 && tally.hits > 1_000, "{through} pass through a hole first, {} hit", tally.hits);
+}
+
+/// Ninety-nine panes that are holes, and a wall.
+#[test]
+fn a_ray_passes_through_any_number_of_holes() {
+    let panes = Mesh::soup((0..100).map(|k| {
+        let z = f64::from(-k);
+        [DVec3::new(-1.0, -1.0, z), DVec3::new(3.0, -1.0, z), DVec3::new(-1.0, 3.0, z)]
+    }));
+    let panes = SceneBvh::build(&[(0, DAffine3::IDENTITY)], &[built(&panes)]).expect("a usable scene");
+    let only_last = "bool is_covered(uint instance, uint triangle, vec2 barycentrics) { return triangle == 99u; }\n";
+    let endless = ray(DVec3::new(0.1, 0.2, 5.0), -DVec3::Z);
+    let said = BvhTracer::masked(only_last).ask_of(&panes, &[endless, Ray { t_max: 103.9, ..endless }]);
+    let answers = said
+        .iter()
+        .map(|Said { closest, any }| (closest.blocked, any.map(|any| any.blocked), closest.triangle, closest.t))
+        .collect::<Vec<_>>();
+    assert_eq!(answers, [(1, Some(1), 99, 104.0), (0, Some(0), 0, 103.9)]);
 }
