@@ -201,7 +201,8 @@ fn choose(found: Vec<Found>, select: Option<&str>) -> Result<Found, Error> {
     let text = |info: &DeviceInfo| format!("{} {} {}", info.name, info.driver, info.driver_version).to_lowercase();
     // A number is an index first, and then a whole word (an RTX 4090) or the beginning of a version; not any digits.
     let has_word = |info: &DeviceInfo| {
-        let is_it = |word: &str| word.strip_prefix(&wanted).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+        let is_it =
+            |word: &str| word.strip_prefix(&wanted).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
         text(info).split([' ', '(', ')', ',']).any(is_it)
     };
     let fits = |info: &DeviceInfo| match index {

@@ -49,8 +49,8 @@ impl OcclusionBackend {
                 format!("{} offers no ray queries: it lacks {}", device.name, device.ray_query_lacks.join(", ")),
             );
         }
-        let (bytes, most) =
-            (triangles.saturating_mul(size_of::<types::BvhTriangle>() as u64), device.limits.max_storage_buffer_range_bytes);
+        let bytes = triangles.saturating_mul(size_of::<types::BvhTriangle>() as u64);
+        let most = device.limits.max_storage_buffer_range_bytes;
         if bytes > most {
             return (Self::RayQuery, format!("{triangles} triangles take more than the {most} bytes of a buffer"));
         }

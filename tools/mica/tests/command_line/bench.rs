@@ -1,5 +1,6 @@
 //! `mica bench`: what is measured, on whatever the device offers. No figure of time is judged.
 
+use crate::occlusion::expects_ray_queries;
 use crate::{Json, failed_in_one_line, in_folder, json, run, succeeded};
 
 /// A bench that is over in no time.
@@ -8,11 +9,6 @@ const QUICK: [&str; 8] = ["bench", "--occlusion", "--size", "48x27", "--rays", "
 fn bench(scenes: &[&str]) -> Vec<Json> {
     let text = succeeded(run(&[&QUICK[..], &["--json", "-"], scenes].concat()));
     text.lines().map(json).collect()
-}
-
-/// Whether the device must offer ray queries, as the environment says.
-fn ray_query_is_expected() -> bool {
-    std::env::var_os("MICA_EXPECT").is_some_and(|expected| expected == "ray-query")
 }
 
 fn kinds(line: &Json) -> Vec<(&str, &str)> {
@@ -37,7 +33,7 @@ fn every_body_answers_the_same_rays_in_one_run() {
     let mut offered = vec![bvh];
     match ray_query["not_offered"].as_str() {
         Some(why) => {
-            assert!(!ray_query_is_expected(), "ray queries are expected: {why}");
+            assert!(!expects_ray_queries(), "ray queries are expected: {why}");
             assert!(why.contains("VK_KHR_ray_query"), "{why}");
             assert!(ray_query["rays"].is_null() && ray_query["ready"].is_null(), "{ray_query}");
         }

@@ -41,7 +41,7 @@ fn ask_for_ray_queries(device: &Json, drivers: Option<&str>, arguments: &[&str])
 }
 
 /// Whether the environment says that there are ray queries: what misses them then fails.
-fn expects_ray_queries() -> bool {
+pub fn expects_ray_queries() -> bool {
     std::env::var("MICA_EXPECT").is_ok_and(|expected| expected == "ray-query")
 }
 
