@@ -38,6 +38,10 @@ pub struct Frame {
     pub radiance: Image,
     /// Tone-mapped, sRGB-encoded.
     pub display: Image,
+    /// What is seen through each pixel: its instance, counted from 1, and its triangle; 0 where nothing is.
+    pub ids: Image,
+    /// Derivatives of the flakes' texture coordinates over the pixel: du/dx, dv/dx, du/dy, dv/dy.
+    pub footprint: Image,
     /// The passes, by index in the graph, that bring tables up to date rather than draw.
     pub updates: std::ops::Range<usize>,
     /// The passes that trace rays, each with how many; a name may occur more than once.
@@ -275,13 +279,16 @@ impl Renderer {
             let of_method = glinting.iter().filter(|material| material.method.name == *name);
             method.keep(&of_method.cloned().collect::<Vec<_>>());
         }
+        if !view.glints {
+            layers.clear();
+        }
         let mirror_occlusion = layers.iter().any(|(finish, _)| finish.mirror_occlusion);
 
         let first_update = g.passes().len();
         self.update_scene(g, lit || mirror_occlusion)?;
         g.because("first frame of the environment");
         self.environment.update(g);
-        for material in &glinting {
+        for material in glinting.iter().filter(|_| view.glints) {
             if let Some(method) = self.methods.get_mut(material.method.name) {
                 method.update(g, material, &mut self.environment);
             }
@@ -327,11 +334,12 @@ impl Renderer {
             g.because("what the flakes reflect is added to the rest");
             radiance = passes::composite::composite(g, &frame, &gbuffer, &radiance, &layer, visibility.as_ref());
         }
-        self.explain_absent(&glinting, mirror_occlusion, &mut left_out);
+        self.explain_absent(view.glints, &glinting, mirror_occlusion, &mut left_out);
         let radiance = self.accumulate(g, &frame, radiance, earlier);
         g.because("every frame");
         let display = passes::tonemap::tonemap(g, &frame, &radiance, view.exposure);
-        Ok(Frame { radiance, display, updates, rays, left_out })
+        let (ids, footprint) = (gbuffer.ids, gbuffer.footprint);
+        Ok(Frame { radiance, display, ids, footprint, updates, rays, left_out })
     }
 
     /// Declares rays of the caller's own: each of the first `count` in `rays`, [`Ray`](crate::Ray)s in scene space, gets a
@@ -427,9 +435,17 @@ impl Renderer {
     }
 
     /// Says what this scene and these settings do not call for, and what no pass renders yet.
-    fn explain_absent(&self, glinting: &[GlintMaterial], mirror_occlusion: bool, left_out: &mut Vec<LeftOut>) {
+    fn explain_absent(
+        &self,
+        drawn: bool,
+        glinting: &[GlintMaterial],
+        mirror_occlusion: bool,
+        left_out: &mut Vec<LeftOut>,
+    ) {
         let mut leave = |what, why: String| left_out.push(LeftOut { what, why });
-        if glinting.is_empty() {
+        if !drawn {
+            leave("glints", "the view is without them".to_owned());
+        } else if glinting.is_empty() {
             leave("glints", "no material glints (glint_count is absent or 0 everywhere)".to_owned());
         }
         if !self.environment.present() {

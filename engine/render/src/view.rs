@@ -17,12 +17,16 @@ pub struct View {
     pub exposure: f32,
     /// Which sample of its pixels the frame is.
     pub sample_index: u32,
+    /// Side of the part of its pixel that a sample stands for, in pixels: footprints are that large. 1 is the whole pixel.
+    pub span: f64,
+    /// Whether glints are drawn. Without them the frame is what lies below them, and tables are kept as they are.
+    pub glints: bool,
 }
 
 impl View {
     /// A view through pixel centres, exposure 1.
     pub fn new(camera: Camera, size: [u32; 2]) -> Self {
-        Self { camera, size, jitter: [0.0; 2], exposure: 1.0, sample_index: 0 }
+        Self { camera, size, jitter: [0.0; 2], exposure: 1.0, sample_index: 0, span: 1.0, glints: true }
     }
 
     /// The same view, its rays moved within their pixels by the `index`-th point of a sequence that fills the pixel
@@ -31,6 +35,14 @@ impl View {
         const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_2];
         let jitter = STEPS.map(|step| (f64::from(index) * step + 0.5).fract() - 0.5);
         Self { jitter, sample_index: index, ..self.clone() }
+    }
+
+    /// The same view, its pixels taken apart into `parts` x `parts` squares, of which this frame shows the one in `column`
+    /// and `row` of each: the mean over all of them is what a box filter sees, with every flake counted once.
+    pub fn part(&self, parts: u32, column: u32, row: u32) -> Self {
+        let span = 1.0 / f64::from(parts.max(1));
+        let jitter = [column, row].map(|place| (f64::from(place) + 0.5) * span - 0.5);
+        Self { jitter, span, sample_index: row * parts + column, ..self.clone() }
     }
 
     /// The camera's part of the frame's constants. Scene space is world space about `center`.
@@ -71,6 +83,7 @@ impl View {
             width: self.size[0],
             height: self.size[1],
             sample_index: self.sample_index,
+            span: self.span as f32,
             ..Default::default()
         }
     }
@@ -113,6 +126,15 @@ mod tests {
                 assert!((py - f64::from(y) - 0.5).abs() < 1e-3, "y {py} for {y}, sample {sample}");
             }
         }
+    }
+
+    #[test]
+    fn parts_tile_the_pixel() {
+        let view = View::new(Camera::looking_at("test", DVec3::Z, DVec3::ZERO, 0.7, 0.1), [8, 8]);
+        assert_eq!(view.part(1, 0, 0), view);
+        let (first, last) = (view.part(4, 0, 0), view.part(4, 3, 2));
+        assert_eq!((first.span, first.jitter), (0.25, [-0.375, -0.375]));
+        assert_eq!((last.sample_index, last.jitter), (11, [0.375, 0.125]));
     }
 
     #[test]

@@ -49,6 +49,25 @@ pub struct Shot {
     pub picture: Option<Picture>,
     /// The rays of each pass that traces any, where the picture was wanted.
     pub rays: Vec<TracedRays>,
+    /// What each pixel sees, where it was wanted.
+    pub surface: Option<Surface>,
+}
+
+/// What a frame is to bring back beside its times.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wanted {
+    /// The picture, and how many rays it took.
+    pub picture: bool,
+    /// What each pixel sees.
+    pub surface: bool,
+}
+
+/// What each pixel sees, row by row from the top.
+pub struct Surface {
+    /// The instance, counted from 1, and its triangle; 0 where nothing is.
+    pub ids: Vec<[u32; 2]>,
+    /// Derivatives of the flakes' texture coordinates over the pixel: du/dx, dv/dx, du/dy, dv/dy.
+    pub footprint: Vec<[f32; 4]>,
 }
 
 /// A frame that was declared and not executed.
@@ -164,9 +183,14 @@ impl Session {
 
     /// Declares a frame. With `sample`, it shows the mean of itself and the samples before it.
     pub fn declare(&mut self, sample: Option<u32>) -> Result<Declared, Failure> {
-        let mut graph = Graph::new();
         let view = sample.map_or_else(|| self.view.clone(), |sample| self.view.sample(sample));
-        let frame = self.renderer.frame(&mut graph, &view, sample)?;
+        self.declare_view(&view, sample)
+    }
+
+    /// Declares a frame of any view; with `earlier`, the mean of itself and so many before it.
+    fn declare_view(&mut self, view: &View, earlier: Option<u32>) -> Result<Declared, Failure> {
+        let mut graph = Graph::new();
+        let frame = self.renderer.frame(&mut graph, view, earlier)?;
         graph.export(&frame.display);
         let passes = graph.passes().iter().map(|pass| (pass.name.clone(), pass.why.clone())).collect();
         Ok(Declared { graph, passes, frame })
@@ -174,23 +198,39 @@ impl Session {
 
     /// Makes a frame, and brings its picture back if `picture` says so.
     pub fn frame(&mut self, sample: Option<u32>, timing: Timing, picture: bool) -> Result<Shot, Failure> {
-        let mut declared = self.declare(sample)?;
+        let declared = self.declare(sample)?;
+        self.execute(declared, timing, Wanted { picture, surface: false })
+    }
+
+    /// Makes a frame of another view than the session's own.
+    pub fn look(&mut self, view: &View, timing: Timing, wanted: Wanted) -> Result<Shot, Failure> {
+        let declared = self.declare_view(view, None)?;
+        self.execute(declared, timing, wanted)
+    }
+
+    fn execute(&mut self, mut declared: Declared, timing: Timing, wanted: Wanted) -> Result<Shot, Failure> {
         let updates_of = declared.updates_of();
         let Declared { graph: g, frame, .. } = &mut declared;
-        let downloads = picture.then(|| (g.download_image(&frame.radiance), g.download_image(&frame.display)));
+        let size = [frame.radiance.extent().width, frame.radiance.extent().height];
+        let pictures = wanted.picture.then(|| (g.download_image(&frame.radiance), g.download_image(&frame.display)));
+        let surfaces = wanted.surface.then(|| (g.download_image(&frame.ids), g.download_image(&frame.footprint)));
         let counts: Vec<_> =
-            frame.rays.iter().filter(|_| picture).map(|of| (of.pass, g.download(&of.counts))).collect();
+            frame.rays.iter().filter(|_| wanted.picture).map(|of| (of.pass, g.download(&of.counts))).collect();
         let mut run = self.executor.run(std::mem::take(g), timing)?;
-        let picture = downloads.map(|(radiance, display)| Picture {
-            size: self.view.size,
+        let picture = pictures.map(|(radiance, display)| Picture {
+            size,
             radiance: floats(&run.take(radiance)),
             display: run.take(display),
+        });
+        let surface = surfaces.map(|(ids, footprint)| Surface {
+            ids: bytemuck::pod_collect_to_vec(&run.take(ids)),
+            footprint: bytemuck::pod_collect_to_vec(&run.take(footprint)),
         });
         let counts = counts.into_iter().map(|(pass, download)| (pass, run.take(download)));
         let counts = counts.map(|(pass, bytes)| (pass, bytemuck::pod_read_unaligned::<RayCounts>(&bytes)));
         let rays = measure::rays(counts);
         let is_update = updates_of(&run.plan);
-        Ok(Shot { is_update, run, left_out: declared.frame.left_out, picture, rays })
+        Ok(Shot { is_update, run, left_out: declared.frame.left_out, picture, rays, surface })
     }
 }
 
