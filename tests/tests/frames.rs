@@ -1,5 +1,6 @@
 //! Whole frames: the same bits twice, only the passes that are called for, and every embedded scene with every method.
 
+use glam::DVec3;
 use mica_oracle::wang2020::AccumulationRule;
 use mica_render::scene::{EquirectMap, Glint, Instance, Light, Material, Scene, procedural};
 use mica_render::{EMBEDDED_SCENES, Environment, METHODS, OcclusionBackend, Renderer, View, embedded_scene};
@@ -60,6 +61,71 @@ fn samples_of_a_pixel_are_averaged() {
             }
         }
     }
+}
+
+/// A plane of large flakes under one light, where a pixel holds a few: what its parts show of them adds up to what the
+/// pixel shows, but for directions that differ by less than a pixel's angle, which turn a flake on or off here and there.
+#[test]
+fn parts_of_a_pixel_show_each_flake_once() {
+    let mut gpu = Gpu::new();
+    let glint = Glint { count: 2e3, alpha: 0.2, gamma_deg: 20.0, color: Some([1.0; 3]), ..Glint::default() };
+    let light = Light::Directional { direction: DVec3::new(0.1, -1.0, 1.4).normalize(), irradiance: [1.0; 3] };
+    let scene = plane(conductor("flakes", glint), 40.0);
+    let mut renderer = Renderer::new(scene, &[light], None, OcclusionBackend::None).expect("a sound scene");
+    let view = OVER_PLANE.view(SIZE);
+    let whole = gpu.render(&mut renderer, &view).picture;
+    let parts = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(column, row)| {
+        let part = view.part(2, column, row);
+        gpu.render(&mut renderer, &part).picture
+    });
+    let green = |pixel: [f32; 4]| f64::from(pixel[1]);
+    let (mut same, mut lit, mut sums) = (0, 0, [0.0; 2]);
+    for (pixel, shown) in whole.pixels.iter().enumerate() {
+        let mean = parts.iter().map(|part| green(part.pixels[pixel])).sum::<f64>() / 4.0;
+        sums = [sums[0] + green(*shown), sums[1] + mean];
+        if green(*shown) > 0.0 {
+            lit += 1;
+            same += usize::from((mean / green(*shown) - 1.0).abs() < 0.03);
+        }
+    }
+    assert!(lit > 200 && same * 100 > lit * 80, "{same} of {lit} pixels that glint");
+    assert!((sums[1] / sums[0] - 1.0).abs() < 0.01, "in all {} of {}", sums[1], sums[0]);
+    // Parts with footprints of whole pixels would show a flake in several of them, and sums alone would not tell.
+    let overlapping = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(column, row)| {
+        let part = View { span: 1.0, ..view.part(2, column, row) };
+        gpu.render(&mut renderer, &part).picture
+    });
+    let differ = whole.pixels.iter().enumerate().filter(|(pixel, shown)| {
+        let mean = overlapping.iter().map(|part| green(part.pixels[*pixel])).sum::<f64>() / 4.0;
+        green(**shown) > 0.0 && (mean / green(**shown) - 1.0).abs() >= 0.03
+    });
+    let differ = differ.count();
+    assert!(differ * 100 > lit * 50, "{differ} of {lit}");
+}
+
+#[test]
+fn without_glints_a_frame_is_what_lies_below_them_and_tables_are_kept() {
+    let mut gpu = Gpu::new();
+    let (mut renderer, view) = embedded("car", "wang2020", OcclusionBackend::Bvh);
+    coarse(&mut renderer);
+    gpu.precompute(&mut renderer);
+    let with = gpu.render(&mut renderer, &view);
+    let below = View { glints: false, ..view.clone() };
+    let without = gpu.render(&mut renderer, &below);
+    for pass in ["glints", "composite", "occlusion", "blur_glints"] {
+        assert!(with.declares(pass) && !without.declares(pass), "{pass}: {:?}", without.draws);
+    }
+    let again = gpu.render(&mut renderer, &view);
+    assert!(again.updates.is_empty(), "tables are made anew: {:?}", again.updates);
+    assert_eq!(with.picture.differing(&again.picture).len(), 0);
+    // Flakes that reflect nothing leave the same: what they add is all that is missing.
+    let darker = with.picture.pixels.iter().zip(&without.picture.pixels);
+    let (mut added, mut taken) = (0, 0);
+    for (with, without) in darker {
+        added += usize::from(with[1] > without[1]);
+        taken += usize::from(with[1] < without[1]);
+    }
+    assert!(added > 100 && taken == 0, "{added} pixels are brighter with glints, {taken} darker");
 }
 
 #[test]

@@ -7,6 +7,7 @@ mod chermain;
 mod claims;
 mod contact_shadows;
 mod deliot_belcour;
+mod displayed;
 mod flake_queries;
 mod flakes;
 mod foreign_models;

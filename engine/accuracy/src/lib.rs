@@ -1,12 +1,25 @@
 //! Methods measured: what they show against what the oracle says they should.
 
+mod bands;
 mod counts;
+mod errors;
+mod flip;
+mod luminance;
+mod path;
 mod point;
+mod reference;
+#[cfg(test)]
+mod sparkle;
 mod stage;
+mod tiles;
 
 pub use counts::{CountErrors, CountLaw};
+pub use errors::{ErrorsError, Pixels, Radiance, Reference};
+pub use flip::{ErrorMap, displayed};
+pub use luminance::luminance;
 pub use point::{
     BandErrors, Bytes, Cost, Errors, Estimate, Machine, Metric, POINT_SCHEMA, PathErrors, Place, Point,
     REFERENCE_SCHEMA, ReferenceLine,
 };
+pub use reference::MeanOfTwo;
 pub use stage::{Condition, Stage, StageError};

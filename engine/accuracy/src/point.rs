@@ -4,7 +4,7 @@
 //! Points are lines of JSON, so that a study can be appended to, resumed and drawn anew. What decides a figure is in the
 //! line: a point is worth keeping only while scene, light, size, method, settings, device, build and effort are the same.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// What lines of points say of themselves.
 pub const POINT_SCHEMA: &str = "mica-point-1";
@@ -14,12 +14,20 @@ pub const REFERENCE_SCHEMA: &str = "mica-reference-1";
 /// A figure and how sure it is: an error with its interval of 95 %, or the median of times with the least and greatest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// The figure.
+    /// The figure; not a number, and `null` in JSON, where it is not defined, as a ratio to nothing.
+    #[serde(deserialize_with = "number_or_null")]
     pub value: f64,
-    /// Lower end.
+    /// Lower end; not a number where nothing is known of how sure the figure is.
+    #[serde(deserialize_with = "number_or_null")]
     pub low: f64,
-    /// Upper end.
+    /// Upper end, likewise.
+    #[serde(deserialize_with = "number_or_null")]
     pub high: f64,
+}
+
+/// JSON has no word for what is not a number: it is written as `null`, and read back here.
+fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
 /// Where points can be compared with each other: what is seen, and at what size.
@@ -73,8 +81,10 @@ pub struct Cost {
     /// Each pass of a frame in isolation.
     pub passes: Vec<(String, Estimate)>,
     /// Tables made when a setting or the environment changes.
+    #[serde(deserialize_with = "number_or_null")]
     pub tables: f64,
     /// What was made once, before the first frame.
+    #[serde(deserialize_with = "number_or_null")]
     pub precomputation: f64,
     /// Bytes on the device that a frame without glints does not need.
     pub glint_bytes: u64,
@@ -91,7 +101,7 @@ pub struct BandErrors {
     pub pixels: usize,
     /// Mean over the reference's.
     pub mean_ratio: Estimate,
-    /// Variance over the reference's.
+    /// Variance within tiles over the reference's.
     pub variance_ratio: Estimate,
     /// Wasserstein-1 distance over the reference's mean.
     pub w1: Estimate,
@@ -115,9 +125,10 @@ pub struct Errors {
     pub left_out: usize,
     /// Mean luminance of the glints over the reference's.
     pub mean_ratio: Estimate,
-    /// Variance of the glints' luminance over the reference's.
+    /// Variance of the glints' luminance within tiles, about their means, over the reference's.
     pub variance_ratio: Estimate,
-    /// Wasserstein-1 distance of the glints' luminance over the reference's mean: that of the bands, by their pixels.
+    /// Wasserstein-1 distance of the glints' luminance over the reference's mean: that of the bands, by their pixels; no number
+    /// where there is no band.
     pub w1: Estimate,
     /// Relative mean square error of the glints' pixels.
     pub rel_mse: Estimate,
@@ -125,7 +136,7 @@ pub struct Errors {
     pub flip: Estimate,
     /// Mean HDR-FLIP of the pictures, all of them.
     pub hdr_flip: Estimate,
-    /// Mean luminance of the pixels that glint over that of the reference's.
+    /// Mean luminance of the pixels that glint over that of the reference's; a pixel glints that is twice as bright as its tile.
     pub energy_per_glint: Estimate,
     /// By scale.
     pub bands: Vec<BandErrors>,
@@ -176,6 +187,7 @@ pub struct ReferenceLine {
     /// Samples of each pixel.
     pub samples: u32,
     /// Standard deviation of a pixel's glints about what they converge to, over their mean.
+    #[serde(deserialize_with = "number_or_null")]
     pub noise: f64,
     /// What a method has that is right but has flakes of its own: the reference's method with another seed.
     pub floor: Errors,
@@ -248,9 +260,18 @@ impl Metric {
 }
 
 impl Estimate {
+    /// A figure that is not defined.
+    pub const UNKNOWN: Self = Self { value: f64::NAN, low: f64::NAN, high: f64::NAN };
+
     /// A figure that is exact.
     pub const fn exact(value: f64) -> Self {
         Self { value, low: value, high: value }
+    }
+
+    /// The same of what cannot be below 0.
+    pub(crate) fn at_least_zero(self) -> Self {
+        let cut = |value: f64| if value < 0.0 { 0.0 } else { value };
+        Self { value: cut(self.value), low: cut(self.low), high: cut(self.high) }
     }
 
     /// |value - 1|, with what that says of the interval.
@@ -287,5 +308,15 @@ mod tests {
         assert!((around.value - 0.02).abs() < 1e-12 && around.low == 0.0 && (around.high - 0.1).abs() < 1e-12);
         let above = Estimate { value: 1.3, low: 1.2, high: 1.5 }.away_from_one();
         assert!((above.low - 0.2).abs() < 1e-12 && (above.high - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_not_a_number_survives_a_line_of_json() {
+        let estimate = Estimate { value: f64::INFINITY, low: f64::NAN, high: 0.1 + 0.2 };
+        let line = serde_json::to_string(&estimate).expect("a line");
+        assert_eq!(line, r#"{"value":null,"low":null,"high":0.30000000000000004}"#);
+        let read: Estimate = serde_json::from_str(&line).expect("an estimate");
+        assert!(read.value.is_nan() && read.low.is_nan() && read.high == estimate.high, "{read:?}");
+        assert!(serde_json::from_str::<Estimate>(r#"{"value":1.0,"low":1.0}"#).is_err(), "a missing figure is no null");
     }
 }
