@@ -1,7 +1,7 @@
 //! Compute shaders of the tests' own, compiled around the program's GLSL as it is or with one passage changed.
 
 use mica_graph::{Access, Binding, BindingKind, Buffer, Graph, Shader, Slot, Stage, StageCode, Stages, Use, Work};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Invocations in a group: what each of these shaders declares.
@@ -18,6 +18,11 @@ pub struct Change<'a> {
     pub to: &'a str,
 }
 
+/// Where the shaders' sources lie: the checkout that this was built in, or what `MICA_ROOT` names where that is far away.
+fn root() -> PathBuf {
+    std::env::var_os("MICA_ROOT").map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join(".."), PathBuf::from)
+}
+
 /// Compiles `tests/tests/FILE`, which may include the program's shaders; `accesses` are its storage buffers, by
 /// binding.
 ///
@@ -28,8 +33,8 @@ pub fn test_shader(
     accesses: &[(u32, Access)],
     params_bytes: u32,
 ) -> &'static Shader {
-    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let shaders = package.join("../shaders_glsl");
+    let root = root();
+    let shaders = root.join("shaders_glsl");
     let folder = tempfile::tempdir().expect("a temporary folder");
     if let Some(Change { file, from, to }) = change {
         let source = std::fs::read_to_string(shaders.join(file)).expect("the shader's source");
@@ -44,7 +49,7 @@ pub fn test_shader(
     // The changed file is found first.
     let done = Command::new(tool)
         .args(["--target-env", "vulkan1.2", &include(folder.path()), &include(&shaders), "-o"])
-        .args([output.as_path(), &package.join("tests").join(file)])
+        .args([output.as_path(), &root.join("tests/tests").join(file)])
         .output()
         .expect("glslangValidator runs (Debian: glslang-tools)");
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stdout));

@@ -112,7 +112,8 @@ fn leak(shader: Shader) -> &'static Shader {
 pub fn compile(glsl: &str, stage: &str) -> &'static [u32] {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let output = folder.path().join("shader.spv");
-    let mut glslang = Command::new("glslangValidator")
+    let tool = std::env::var_os("GLSLANG_VALIDATOR").unwrap_or_else(|| "glslangValidator".into());
+    let mut glslang = Command::new(tool)
         .args(["--target-env", "vulkan1.3", "--stdin", "-S", stage, "-o"])
         .arg(&output)
         .stdin(Stdio::piped())

@@ -8,7 +8,7 @@ use mica_graph::{Access, Binding, BindingKind, Buffer, Graph, Shader, Slot, Stag
 use mica_render::scene::Scene;
 use mica_render::scene::bvh::{MeshBvh, SceneBvh};
 use mica_shaders::types::{Ray, RayAnswer};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const GROUP: u32 = 64;
@@ -132,8 +132,10 @@ impl BvhTracer {
 /// Compiles the program in this file around the hierarchy, changed or not, with masks or not. Shaders are statics in the
 /// program; a test's live as long as its process.
 fn shader(file: &str, from: &str, to: &str, covered: Option<&str>) -> &'static Shader {
-    let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let shaders = repository.join("shaders_glsl");
+    // The checkout that this was built in, or where that is far away what holds its shaders.
+    let built_in = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let root = std::env::var_os("MICA_ROOT").map_or_else(built_in, PathBuf::from);
+    let shaders = root.join("shaders_glsl");
     let folder = tempfile::tempdir().expect("a temporary folder");
     let source = std::fs::read_to_string(shaders.join("occlusion/bvh.glsl")).expect("the shader's source");
     assert!(source.contains(from), "occlusion/bvh.glsl no longer says {from:?}: change this test with it");
@@ -148,7 +150,7 @@ fn shader(file: &str, from: &str, to: &str, covered: Option<&str>) -> &'static S
     let done = Command::new(tool)
         .args(covered.map(|_| "-DALPHA_MASKS"))
         .args(["--target-env", "vulkan1.2", &include(folder.path()), &include(&shaders), "-o"])
-        .args([output.as_path(), &repository.join(file)])
+        .args([output.as_path(), &root.join(file)])
         .output()
         .expect("glslangValidator runs (Debian: glslang-tools)");
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stdout));
