@@ -6,6 +6,7 @@
 #include "shared/materials.glsl"
 #include "shared/ray_counts.glsl"
 #include "shared/ray_offset.glsl"
+#include "shared/scene.glsl"
 #include "occlusion.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -22,7 +23,8 @@ void main() {
       vec3 mirrored = reflect(normalize(camera_ray(pixel)), seen.normal);
       // Interpolated or mapped normals may mirror into the surface itself: then along it, or it would hide its own rim.
       mirrored += max(1e-3 - dot(mirrored, seen.geometric_normal), 0.0) * seen.geometric_normal;
-      vec3 origin = offset_origin(seen.position, seen.geometric_normal, frame.scene_unit);
+      float reach = triangle_reach(instances[seen.instance - 1u], seen.triangle);
+      vec3 origin = offset_origin(seen.position, seen.geometric_normal, reach);
       free = occluded(origin, mirrored, 0.0, 1e30) ? 0.0 : 1.0;
     }
     imageStore(visibility, ivec2(pixel), vec4(free));

@@ -6,6 +6,7 @@
 #include "shared/lights.glsl"
 #include "shared/ray_counts.glsl"
 #include "shared/ray_offset.glsl"
+#include "shared/scene.glsl"
 #include "occlusion.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -16,7 +17,11 @@ void main() {
   if (!outside_frame(pixel)) {
     Seen seen = seen_at(pixel);
     uint mask = 0u;
-    vec3 origin = offset_origin(seen.position, seen.geometric_normal, frame.scene_unit);
+    float reach = 0.0;
+    if (seen.instance != 0u) {
+      reach = triangle_reach(instances[seen.instance - 1u], seen.triangle);
+    }
+    vec3 origin = offset_origin(seen.position, seen.geometric_normal, reach);
     for (uint index = 0u; index < (seen.instance != 0u ? frame.light_count : 0u); ++index) {
       Light light = lights[index];
       Arrival arrival = arrival_at(light, seen.position);
@@ -25,9 +30,9 @@ void main() {
       vec3 towards = arrival.direction;
       float t_max = 1e30;
       if (light.kind != LIGHT_DIRECTIONAL) {
-        // Ends as far before the light as it starts before its surface: what a lamp lies on does not hide it, and a
-        // shade close to a far lamp does.
-        towards = offset_origin(light.position, -arrival.direction, frame.scene_unit) - origin;
+        // Ends before the light by as much as it would start off a surface there: what a lamp lies on does not hide it, and
+        // a shade close to a far lamp does.
+        towards = offset_origin(light.position, -arrival.direction, reach) - origin;
         t_max = dot(towards, arrival.direction) > 0.0 ? 1.0 : 0.0;
       }
       if (dark || occluded(origin, towards, 0.0, t_max)) {

@@ -13,7 +13,7 @@ struct Ray {
   vec3 direction; // Of any length.
   float t_max;
   vec3 normal; // Unless 0, the origin is first moved off the surface along it, as every pass does.
-  uint reserved;
+  float reach; // Of that surface, as triangle_reach has it. 0 where it is not known: a quarter of the scene's size.
 };
 
 struct RayAnswer {
@@ -27,7 +27,7 @@ struct RayAnswer {
 layout(push_constant) uniform Params {
   uint count; // Rays.
   uint closest; // 1 asks for the closest hit, 0 for any.
-  float scene_unit; // As in Frame.
+  float scene_unit; // The power of two that the scene fits into: its largest coordinate in scene space is no larger.
 } params;
 
 layout(std430, binding = 30) readonly buffer Rays { Ray rays[]; };
@@ -38,8 +38,8 @@ void main() {
   uint index = gl_GlobalInvocationID.y * gl_NumWorkGroups.x * gl_WorkGroupSize.x + gl_GlobalInvocationID.x;
   if (index < params.count) {
     Ray ray = rays[index];
-    vec3 origin =
-      ray.normal == vec3(0.0) ? ray.origin : offset_origin(ray.origin, ray.normal, params.scene_unit);
+    float reach = ray.reach > 0.0 ? ray.reach : 0.25 * params.scene_unit;
+    vec3 origin = ray.normal == vec3(0.0) ? ray.origin : offset_origin(ray.origin, ray.normal, reach);
     RayHit hit = RayHit(0.0, 0u, 0u, vec2(0.0));
     bool blocked = params.closest != 0u
       ? closest_hit(origin, ray.direction, ray.t_min, ray.t_max, hit)

@@ -13,7 +13,6 @@ layout(std140, binding = 0) uniform Frame {
   uint height; // Pixels along y.
   uint light_count; // Lights in the scene.
   uint has_environment; // 1 where there is an environment.
-  float scene_unit; // The power of two that the scene fits into: its largest coordinate in scene space is no larger.
   uint sample_index; // Which sample of its pixels this frame is: methods that draw directions draw others in each.
   float span; // Side of the part of its pixel that a sample stands for, in pixels: 1, or less where a pixel is taken apart.
 } frame;

@@ -11,6 +11,7 @@ layout(binding = 14) uniform texture2D normal;
 // What all shading needs of a pixel; `instance` is 0 where nothing was seen, the instance's index plus 1 elsewhere.
 struct Seen {
   uint instance;
+  uint triangle; // In the list of the instance's mesh.
   vec3 position; // In scene space.
   vec3 normal; // Shading normal, on the viewer's side.
   vec3 geometric_normal; // Of the triangle, on the viewer's side.
@@ -19,7 +20,9 @@ struct Seen {
 Seen seen_at(uvec2 pixel) {
   ivec2 at = ivec2(pixel);
   Seen seen;
-  seen.instance = texelFetch(ids, at, 0).x;
+  uvec2 id = texelFetch(ids, at, 0).xy;
+  seen.instance = id.x;
+  seen.triangle = id.y;
   vec4 first = texelFetch(position, at, 0);
   vec4 second = texelFetch(normal, at, 0);
   seen.position = first.xyz;

@@ -33,6 +33,24 @@ vec3 scene_point(Instance instance, vec3 local) {
   );
 }
 
+// The numbers that points of a triangle are made of, in scene space: the largest sum, along any axis, of the magnitudes of the
+// terms that scene_point adds up for a corner. In units of rounding (2^-24) of it, a corner is off by 5 along each axis: each
+// term by its coefficient, a product and three sums. A point that is put together from such corners is off by 11, with the
+// roundings of two sides (2), their products (2) and two sums (2). However far off the eye is that finds it there: what goes
+// wrong on the way moves it within the triangle. Corners on different axes may sum up to 3 times as much together as each
+// does; that buys two of three transforms.
+float triangle_reach(Instance instance, uint triangle) {
+  uvec3 corners = triangle_vertices(instance, triangle);
+  vec3 a = abs(local_position(corners.x));
+  vec3 b = abs(local_position(corners.y));
+  vec3 c = abs(local_position(corners.z));
+  vec4 farthest = vec4(max(a, max(b, c)), 1.0);
+  return max(
+    dot(abs(instance.scene_from_local[0]), farthest),
+    max(dot(abs(instance.scene_from_local[1]), farthest), dot(abs(instance.scene_from_local[2]), farthest))
+  );
+}
+
 vec3 scene_vector(Instance instance, vec3 local) {
   return vec3(
     dot(instance.scene_from_local[0].xyz, local),

@@ -486,7 +486,6 @@ impl Renderer {
             // Directions of the scene are turned back into the map's.
             environment: [cos as f32, sin as f32, 1.0, 0.0],
             light_count: self.buffers.light_count,
-            scene_unit: self.buffers.scene_unit,
             has_environment: u32::from(self.environment.present()),
             ..view.frame(self.buffers.center)
         };

@@ -25,13 +25,14 @@ pub(crate) fn occlusion(
         (),
         Bind {
             frame,
+            positions: &scene.positions.buffer,
             ids: &gbuffer.ids,
             position: &gbuffer.position,
             normal: &gbuffer.normal,
             ray_counts: &mut rays.counts,
             visibility: &mut visibility,
         },
-        Unmasked { instances: &scene.instances.buffer, materials: &scene.materials }
+        Unmasked { instances: &scene.instances.buffer, indices: &scene.indices.buffer, materials: &scene.materials }
     );
     (visibility, rays)
 }

@@ -25,13 +25,15 @@ pub(crate) fn shadows(
         (),
         Bind {
             frame,
+            positions: &scene.positions.buffer,
             lights: &scene.lights.buffer,
             ids: &gbuffer.ids,
             position: &gbuffer.position,
             normal: &gbuffer.normal,
             ray_counts: &mut rays.counts,
             shadow_mask: &mut shadow_mask,
-        }
+        },
+        Unmasked { instances: &scene.instances.buffer, indices: &scene.indices.buffer }
     );
     (shadow_mask, rays)
 }

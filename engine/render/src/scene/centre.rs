@@ -10,8 +10,8 @@ impl Scene {
     /// Moves the positions of each mesh that lies far from its own origin there, and its instances' transforms with it, so
     /// that everything stays where it is in the world to within half a unit in the last place of its size.
     ///
-    /// A position in the world is computed from the local one in f32, and is off by as much as f32 rounds the local one:
-    /// at 1,000 times a mesh's size, one ray in ten that leaves its surface meets it again.
+    /// A position in the world is computed from the local one in f32, and is off by as much as f32 rounds the local one.
+    /// Rays that leave its surface start as much farther off it: at 1,000 times a mesh's size, by a twentieth of that.
     pub fn centre_far_meshes(&mut self) {
         let offsets: Vec<Option<DVec3>> = self.meshes.iter_mut().map(centre_if_far).collect();
         for instance in &mut self.instances {

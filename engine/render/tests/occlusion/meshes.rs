@@ -225,6 +225,22 @@ pub fn grid(side: u32) -> Mesh {
     Mesh { positions, indices }
 }
 
+/// The square from -1 to 1 in the plane z = 0, its middle of squares half as large, so often: sizes halve towards the middle.
+pub fn ever_smaller_squares(times: i32) -> Mesh {
+    let at = |[x, y]: [f64; 2], size: f64| DVec3::new(x, y, 0.0) * size;
+    let square = |x: f64, y: f64, size: f64| {
+        let [a, b, c, d] = [[x, y], [x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]].map(|corner| at(corner, size));
+        [[a, b, c], [a, c, d]]
+    };
+    let side = [-2.0, -1.0, 0.0, 1.0];
+    let cells = side.into_iter().flat_map(|y| side.map(|x| (x, y)));
+    let outer = cells.filter(|&(x, y)| x == -2.0 || x == 1.0 || y == -2.0 || y == 1.0);
+    Mesh::soup((0..times).flat_map(|time| {
+        let size = 0.5f64.powi(time + 1);
+        outer.clone().flat_map(move |(x, y)| square(x, y, size)).collect::<Vec<_>>()
+    }))
+}
+
 /// Triangles whose corners are one point, or on a line, between ordinary ones.
 pub fn without_area(count: usize) -> Mesh {
     let mut random = Random::new(23);

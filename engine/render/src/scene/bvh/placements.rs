@@ -15,10 +15,16 @@ const MAX_INSTANCES: usize = 1 << BVH_SCENE_LEVELS;
 /// coefficient, a product and two sums make 8. The test of boxes and triangles in local space moves things by another 16.
 const RAY_ROUNDOFF: f64 = 32.0 * 0.5 * f32::EPSILON as f64;
 
-/// An instance whose transform makes rounding errors so many times larger is stored in scene space instead. A rotation
-/// and a translation make them at most 6 times larger, and so does a scale along the mesh's axes before, or along the
-/// scene's after: these stay as they are, and rays that leave their surfaces do not meet them again.
+/// An instance whose transform makes rounding errors so many times larger, beside the scene's size, is stored in scene space
+/// instead. A rotation and a translation make them at most 6 times larger, and so does a scale along the mesh's axes
+/// before, or along the scene's after: these stay as they are.
 const TOLERABLE_GAIN: f64 = 8.0;
+
+/// The same beside the numbers that one of its triangles is made of, however small it is in the scene: for each of four
+/// parts, which are the instance's translation and its mesh's three axes. A triangle is as large and as far out as they make
+/// it together, so its gain is at most four times this, and rays that `offset_origin` (`shared/ray_offset.glsl`) moved off
+/// it do not meet it again. A scale along the mesh's axes, then a rotation, then a translation have 4.8 at most.
+const TOLERABLE_PART: f64 = 6.0;
 
 /// How far from the local origin a ray may begin, at most and at least: products of three such lengths, as in the test of
 /// triangles, stay within f32.
@@ -170,7 +176,6 @@ impl Placed {
     pub(super) fn ray_error(&self, reach: DVec3) -> Option<DVec3> {
         let scene_from_local = self.scene_from_local;
         let local_from_scene = scene_from_local.inverse();
-        let absolute = |matrix: DMat3| DMat3::from_cols(matrix.x_axis.abs(), matrix.y_axis.abs(), matrix.z_axis.abs());
         let local = absolute(local_from_scene.matrix3) * reach + local_from_scene.translation.abs();
         let vanishing = f64::from(f32::MIN_POSITIVE) * (reach.element_sum() + 1.0);
         let terms = RAY_ROUNDOFF * local + vanishing;
@@ -182,8 +187,27 @@ impl Placed {
         let in_range = LOCAL_REACH.contains(&local.max_element())
             && fits(&scene_from_local.matrix3)
             && fits(&local_from_scene.matrix3);
-        (exact_enough && in_range).then_some(error)
+        (exact_enough && in_range && serves_small_triangles(&scene_from_local, &local_from_scene)).then_some(error)
     }
+}
+
+fn absolute(matrix: DMat3) -> DMat3 {
+    DMat3::from_cols(matrix.x_axis.abs(), matrix.y_axis.abs(), matrix.z_axis.abs())
+}
+
+/// Whether a ray that starts on any triangle of an instance is exact enough beside that triangle, as [`TOLERABLE_PART`] has it.
+///
+/// With `|M| |c| + |t|` the terms of a corner `c` in scene space, `|M| (|W| (|M| |c| + |t|) + |W t|)` bounds those of a ray
+/// that starts there: of `t`, and of each column of `M`, the second has to stay near the first.
+fn serves_small_triangles(scene_from_local: &DAffine3, local_from_scene: &DAffine3) -> bool {
+    let (there, back) = (absolute(scene_from_local.matrix3), absolute(local_from_scene.matrix3));
+    let translation = scene_from_local.translation.abs();
+    let of_translation = there * (back * translation + local_from_scene.translation.abs());
+    let parts = [(of_translation, translation)]
+        .into_iter()
+        .chain([there.x_axis, there.y_axis, there.z_axis].map(|column| (there * (back * column), column)));
+    // Written so that NaN fails.
+    parts.into_iter().all(|(error, terms)| error.max_element() <= TOLERABLE_PART * terms.max_element())
 }
 
 /// The least and the greatest corner of the box around points; `None` around none.
@@ -252,5 +276,33 @@ mod tests {
         for (x, size) in [(1.0, 1.0), (1e-6, 1.0), (1e-11, 1e11), (1e6, 1.0), (1e11, 1e-11), (1e20, 1e-20)] {
             assert!(!stored(x, size), "{x}, a mesh {size} wide");
         }
+    }
+
+    /// Beside something large, the scene is no measure of what f32 loses of a small triangle: its own numbers are. What a
+    /// node's translation, rotation and scale make serves all, whatever they are.
+    #[test]
+    fn what_is_lost_on_its_own_triangles_is_stored_in_scene_space_in_any_scene() {
+        let turned = DAffine3::from_quat(DQuat::from_axis_angle(DVec3::new(0.48, 0.6, 0.64), 1.0));
+        let to = |y| DAffine3::from_translation(DVec3::new(0.0, y, 0.0));
+        let stretched = DAffine3::from_scale(DVec3::new(1e3, 1.0, 0.1));
+        // The scene is as large along each axis as rounding along it would have to be.
+        let large = DAffine3::from_scale(DVec3::new(1e9, 1e6, 1e5));
+        let places = [
+            (to(5.0) * turned * stretched, false),
+            (to(5.0) * stretched, false),
+            (stretched * turned, false),
+            // A y of 5 is 50 along the mesh's axes, turned, and 50,000 along x.
+            (to(5.0) * stretched * turned, true),
+            (large, false),
+        ];
+        let instances = places.map(|(place, _)| (0, place));
+        let made = Placements::new(&instances, 1, |_| POINTS.into_iter()).expect("usable places");
+        let stored: Vec<bool> = made.list().iter().map(|placed| placed.in_scene_space).collect();
+        assert_eq!(stored, places.map(|(_, stored)| stored));
+        // And where it moves there.
+        let [.., unmoved, _, large] = instances;
+        let made = Placements::new(&[unmoved, large], 1, |_| POINTS.into_iter()).expect("usable places");
+        let moved = |y| made.moved(&[(0, to(y) * unmoved.1)], |_| box_corners()).expect("a usable place");
+        assert!(moved(0.0).is_some() && moved(5.0).is_none());
     }
 }
