@@ -4,6 +4,7 @@
 // As printed, or with the slips that engine/render/src/methods/deliot_belcour.rs names repaired.
 #include "shared/deliot_belcour_noise.glsl"
 #include "shared/footprint_ellipse.glsl"
+#include "shared/gated_binomial.glsl"
 #include "shared/hash.glsl"
 #include "shared/lobe_light.glsl"
 
@@ -36,31 +37,6 @@ float probit(float u) {
   float t = sqrt(-2.0 * log(tail));
   float z = t - (2.515517 + t * (0.802853 + t * 0.010328)) / (1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308)));
   return u < 0.5 ? -z : z;
-}
-
-// 1 - (1 - p)^n for p < 1, without the cancellation of its printed form.
-float chance_of_any(float n, float p) {
-  float s = p / (2.0 - p);
-  float z = s * s;
-  float minus_log = p < 0.4
-    ? 2.0 * s * (1.0 + z * (1.0 / 3.0 + z * (1.0 / 5.0 + z * (1.0 / 7.0 + z * (1.0 / 9.0)))))
-    : -log(max(1.0 - p, 1e-30));
-  float x = n * minus_log;
-  return x < 0.3 ? x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0))))) : 1.0 - exp(-x);
-}
-
-// Four counts of the lit among n flakes, each lit with probability p, from uniform and normal numbers: a soft gate says
-// whether there is one at all, a normal number how many more.
-vec4 lit_of(float n, float p, vec4 uniforms, vec4 normal_numbers) {
-  bool exact = repaired == 1u;
-  float any_lit = exact ? (n < 1.0 ? n * p : chance_of_any(n, p)) : 1.0 - pow(1.0 - p, n);
-  float softness = 0.1 * clamp(10.0 * any_lit, 0.0, 1.0) * clamp(10.0 * (1.0 - any_lit), 0.0, 1.0);
-  vec4 gate = clamp((any_lit + softness - uniforms) / max(2.0 * softness, 1e-30), 0.0, 1.0);
-  float mean = (n - 1.0) * p;
-  // Printed without the maximum, and no number where n < 1; minimum and maximum then take 0 for the count above one.
-  float deviation = sqrt(max(mean * (1.0 - p), 0.0));
-  float most = exact ? max(n - 1.0, 0.0) : n;
-  return gate * (1.0 + clamp(floor(normal_numbers * deviation + mean), 0.0, most));
 }
 
 // Share of the flakes of one grid that are lit, times the grid's weight.
@@ -98,7 +74,9 @@ float lit_share(Grid grid, float weight, vec2 uv, vec2 slope, float p) {
     vec2 n01 = unpackHalf2x16(packed.z);
     vec2 n11 = unpackHalf2x16(packed.w);
     float weighted = n * weight;
-    vec4 lit = lit_of(weighted, p, vec4(n00.y, n10.y, n01.y, n11.y), vec4(n00.x, n10.x, n01.x, n11.x));
+    vec4 lit = gated_binomial(
+      weighted, p, vec4(n00.y, n10.y, n01.y, n11.y), vec4(n00.x, n10.x, n01.x, n11.x), repaired == 1u
+    );
     float blended = mix(mix(lit.x, lit.y, inside.x), mix(lit.z, lit.w, inside.x), inside.y);
     share += n > 0.0 ? weights[corner] * blended / n : 0.0;
   }

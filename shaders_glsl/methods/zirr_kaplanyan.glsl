@@ -3,6 +3,7 @@
 // Kept as they stand: sizes below 0 are folded back to tiny positive ones, and the count is divided by them; fewer than one
 // flake in a cell can still give a whole one; the Gaussian branch lacks a factor sqrt 2; two grids are blended linearly,
 // which takes variance away; the light's cone adds a floor to the lobe. The sine hash is an integer one here.
+#include "shared/blended_count.glsl"
 #include "shared/directions.glsl"
 #include "shared/hash.glsl"
 #include "shared/lobe_light.glsl"
@@ -21,8 +22,6 @@ layout(push_constant) uniform Params {
 };
 
 const int SHORT_CELLS = 4; // Cells walked across the long axis.
-const float GAUSSIAN_ABOVE = 5.0; // Expected lit flakes from which a normal number stands for the count.
-const int MAX_COUNT = 17; // The greatest count by inversion.
 const float LARGEST_INDEX = 1073741824.0; // Cells are told apart to this index, 2^30.
 
 // Steps left to this invocation: loops are not endless on every driver (see wang2020.glsl).
@@ -49,54 +48,6 @@ Strip strip_of(vec2 dx, vec2 dy) {
   found.width = abs(x.x * y.y - x.y * y.x) / found.extent;
   found.skew = side.y / side.x;
   return found;
-}
-
-// ln(1 - p) without the digits that 1 - p loses.
-float log_of_rest(float p) {
-  float s = p / (p - 2.0);
-  float z = s * s;
-  float series = 1.0 + z * (1.0 / 3.0 + z * (0.2 + z * (1.0 / 7.0 + z * (1.0 / 9.0 + z / 11.0))));
-  return p < 0.4 ? 2.0 * s * series : log(1.0 - p);
-}
-
-// 1 - exp(x) for x <= 0.
-float rest_of_exponential(float x) {
-  float series = 1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * (1.0 + x / 7.0)))));
-  return x > -0.5 ? -x * series : 1.0 - exp(x);
-}
-
-// A normal number of mean 0 and variance 1 (Box and Muller 1958).
-float normal_from(uint key) {
-  float radius = sqrt(-2.0 * log(unit_from(hash(key, 5u))));
-  return radius * cos(2.0 * PI * unit_from(hash(key, 6u)) - PI);
-}
-
-// How many of n flakes, a number that need not be whole, shine with probability p each. Many by a normal number. Few by
-// inversion of the distribution, for the two powers of .9 about p, and between them linearly.
-float sampled_count(float n, float p, uint key) {
-  float mean = n * p;
-  if (mean > GAUSSIAN_ABOVE) {
-    float deviation = sqrt(mean * (1.0 - p)) * (root_two == 1u ? 1.0 : 0.70710678);
-    return clamp(mean + deviation * normal_from(key), 0.0, n);
-  }
-  float power = floor(log2(p) * (-1.0 / 0.15200309));
-  float high = exp2(-0.15200309 * power);
-  vec2 ends = min(vec2(0.9 * high, high), 1.0 - 1e-6);
-  vec2 logs = n * vec2(log_of_rest(ends.x), log_of_rest(ends.y));
-  vec2 odds = ends / (1.0 - ends);
-  // P(K = k) and P(K > k) from k = 0 on; a number below P(K > k) means more than k.
-  vec2 mass = exp(logs);
-  vec2 beyond = vec2(rest_of_exponential(logs.x), rest_of_exponential(logs.y));
-  float v = (float(hash(key, 7u)) + 0.5) * (1.0 / 4294967296.0);
-  vec2 count = vec2(0.0);
-  for (int k = 0; k < MAX_COUNT && float(k) < n && any(lessThan(vec2(v), beyond)) && steps_left > 0; ++k) {
-    --steps_left;
-    count += vec2(lessThan(vec2(v), beyond));
-    mass *= max(n - float(k), 0.0) / float(k + 1) * odds;
-    beyond -= mass;
-  }
-  float share = ends.y > ends.x ? clamp((p - ends.x) / (ends.y - ends.x), 0.0, 1.0) : 0.0;
-  return mix(count.x, count.y, share);
 }
 
 // The part of a cell's index that it shares with its even children: the index without its factors of 2.
@@ -162,7 +113,7 @@ float glint_density(GlintSurface surface, vec3 i, vec3 h) {
       float size = 1.0 + variation * 0.70710678 * normal_from(place);
       size = size > 0.0 ? size : fract(size) / (1.0 - size);
       float sampled = max(flakes * size, min(1.0, flakes));
-      counted += weight * sampled_count(sampled, probability, key);
+      counted += weight * blended_count(sampled, probability, key, root_two == 1u, steps_left);
       expected += weight * flakes * size;
     }
   }

@@ -35,6 +35,19 @@ float normal_exceeded(float v) {
   return 1.41421356 * fit * (1.0 - 2.0 * v);
 }
 
+// The number of successes that is exceeded with probability v, where that is three or more: the quantile by Cornish and
+// Fisher (1938) to the second order, its variance less the 1/12 that rounding adds.
+float matched_normal(float n, float q, float mean, float v) {
+  float z = normal_exceeded(clamp(v, 1e-9, 0.99999994));
+  float variance = mean * (1.0 - q);
+  float skewness = (1.0 - 2.0 * q) * inversesqrt(variance);
+  float kurtosis = (1.0 - 6.0 * q * (1.0 - q)) / variance;
+  float z2 = z * z;
+  float quantile = z + (z2 - 1.0) * skewness / 6.0 + (z2 - 3.0) * z * kurtosis / 24.0
+    - (2.0 * z2 - 5.0) * z * skewness * skewness / 36.0;
+  return clamp(floor(mean + 0.5 + sqrt(max(variance - 1.0 / 12.0, 0.0)) * quantile), 0.0, n);
+}
+
 // Loop iterations that `binomial` takes on average.
 float binomial_steps(float n, float p) {
   float mean = n * min(p, max(1.0 - p, 0.0));
@@ -42,8 +55,7 @@ float binomial_steps(float n, float p) {
 }
 
 // Binomial(n, p) for whole n. Grows with p for the same word; small words are many successes, so that rare ones keep
-// their probability. Beyond a mean of 16 the quantile by Cornish and Fisher (1938) to the second order, its variance
-// less the 1/12 that rounding adds.
+// their probability. Beyond a mean of 16 a matched normal number.
 float binomial(float n, float p, uint word) {
   bool mirrored = p > 0.5;
   float q = mirrored ? max(1.0 - p, 0.0) : p;
@@ -62,15 +74,27 @@ float binomial(float n, float p, uint word) {
       tail -= exactly;
     }
   } else {
-    float z = normal_exceeded(clamp(v, 1e-9, 0.99999994));
-    float variance = mean * (1.0 - q);
-    float skewness = (1.0 - 2.0 * q) * inversesqrt(variance);
-    float kurtosis = (1.0 - 6.0 * q * (1.0 - q)) / variance;
-    float z2 = z * z;
-    float quantile = z + (z2 - 1.0) * skewness / 6.0 + (z2 - 3.0) * z * kurtosis / 24.0
-      - (2.0 * z2 - 5.0) * z * skewness * skewness / 36.0;
-    count = clamp(floor(mean + 0.5 + sqrt(variance - 1.0 / 12.0) * quantile), 0.0, n);
+    count = matched_normal(n, q, mean, v);
   }
+  return mirrored ? n - count : count;
+}
+
+// Binomial(n, p) for whole n without a loop: exact thresholds for the first three counts, above them a matched normal number.
+// The same orientation of the word as above.
+float binomial_without_loop(float n, float p, uint word) {
+  bool mirrored = p > 0.5;
+  float q = mirrored ? max(1.0 - p, 0.0) : p;
+  float v = (float(mirrored ? ~word : word) + 0.5) * 2.3283064e-10;
+  float mean = n * q;
+  float log_none = n * log_one_minus(q);
+  float odds = q / (1.0 - q);
+  float none = exp(log_none);
+  float one = none * odds * n;
+  float two = one * odds * 0.5 * max(n - 1.0, 0.0);
+  float any = one_minus_exp(log_none);
+  float few = v < any ? (v < any - one ? 2.0 : 1.0) : 0.0;
+  float count = v < any - one - two ? max(matched_normal(n, q, mean, v), 3.0) : few;
+  count = min(count, n);
   return mirrored ? n - count : count;
 }
 

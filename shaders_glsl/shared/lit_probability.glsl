@@ -2,33 +2,12 @@
 #ifndef LIT_PROBABILITY_GLSL
 #define LIT_PROBABILITY_GLSL
 #include "shared/constants.glsl"
+#include "shared/error_function.glsl"
 
-// Complementary error function for x >= 0, relative error below 1.2e-7 (Chebyshev fit, Numerical Recipes 6.2).
-float erfc_positive(float x) {
-  float t = 1.0 / (1.0 + 0.5 * x);
-  float series = 0.17087277;
-  series = -0.82215223 + t * series;
-  series = 1.48851587 + t * series;
-  series = -1.13520398 + t * series;
-  series = 0.27886807 + t * series;
-  series = -0.18628806 + t * series;
-  series = 0.09678418 + t * series;
-  series = 0.37409196 + t * series;
-  series = 1.00002368 + t * series;
-  series = -1.26551223 + t * series;
-  return t * exp(-x * x + series);
-}
-
-// erf(high) - erf(low) for low <= high; differences of erfc where both lie on one side of 0, so that tails keep digits.
-float erf_between(float low, float high) {
-  if (low >= 0.0) {
-    return erfc_positive(low) - erfc_positive(high);
-  }
-  if (high <= 0.0) {
-    return erfc_positive(-high) - erfc_positive(-low);
-  }
-  return 2.0 - erfc_positive(high) - erfc_positive(-low);
-}
+// Nodes of the quadrature: 8, 16 or 32.
+#ifndef LIT_PROBABILITY_NODES
+#define LIT_PROBABILITY_NODES 16
+#endif
 
 // In slope space the normals are a Gaussian and those that reflect i into the cone fill an ellipse: its equation is
 // (s, 1)' C (s, 1) <= 0 with C = (i.o + cos gamma) I - (i o' + o i') (Jakob et al. 2014, Eq. 13, undivided), and
@@ -39,6 +18,16 @@ float erf_between(float low, float high) {
 // the tests of the 1-degree tables (alpha from .02, polar angles to 80 degrees); it grows where gamma is over 1.5 alpha.
 // Where the ellipse opens (both directions within gamma of the horizon) the density at h times the cone serves.
 float lit_probability(vec3 i, vec3 o, float sin2_half_gamma, float alpha) {
+  const int HALF = LIT_PROBABILITY_NODES / 2;
+  // The positive nodes; the others are their negatives.
+#if LIT_PROBABILITY_NODES == 8
+  const float NODES[4] = float[](
+    0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975362
+  );
+  const float WEIGHTS[4] = float[](
+    0.3626837833783617, 0.3137066458778869, 0.2223810344533744, 0.1012285362903771
+  );
+#elif LIT_PROBABILITY_NODES == 16
   const float NODES[8] = float[](
     0.0950125098376374, 0.2816035507792589, 0.4580167776572274, 0.6178762444026438,
     0.7554044083550030, 0.8656312023878318, 0.9445750230732326, 0.9894009349916499
@@ -47,6 +36,20 @@ float lit_probability(vec3 i, vec3 o, float sin2_half_gamma, float alpha) {
     0.1894506104550685, 0.1826034150449236, 0.1691565193950025, 0.1495959888165767,
     0.1246289712555339, 0.0951585116824928, 0.0622535239386479, 0.0271524594117541
   );
+#else
+  const float NODES[16] = float[](
+    0.0483076656877383, 0.1444719615827965, 0.2392873622521371, 0.3318686022821277,
+    0.4213512761306353, 0.5068999089322294, 0.5877157572407623, 0.6630442669302152,
+    0.7321821187402897, 0.7944837959679424, 0.8493676137325700, 0.8963211557660521,
+    0.9349060759377397, 0.9647622555875064, 0.9856115115452684, 0.9972638618494816
+  );
+  const float WEIGHTS[16] = float[](
+    0.0965400885147277, 0.0956387200792747, 0.0938443990808045, 0.0911738786957638,
+    0.0876520930044038, 0.0833119242269467, 0.0781938957870702, 0.0723457941088483,
+    0.0658222227763617, 0.0586840934785356, 0.0509980592623761, 0.0428358980222268,
+    0.0342738629130218, 0.0253920653092620, 0.0162743947309057, 0.0070186100094705
+  );
+#endif
   vec3 sum = i + o;
   float length2 = dot(sum, sum);
   if (length2 < 1e-12 || sum.z <= 0.0) {
@@ -89,12 +92,12 @@ float lit_probability(vec3 i, vec3 o, float sin2_half_gamma, float alpha) {
   float middle = 0.5 * (from + to);
   float half_range = 0.5 * (to - from);
   float total = 0.0;
-  for (int node = 0; node < 16; ++node) {
-    float t = middle + half_range * (node < 8 ? NODES[node] : -NODES[node - 8]);
+  for (int node = 0; node < LIT_PROBABILITY_NODES; ++node) {
+    float t = middle + half_range * (node < HALF ? NODES[node] : -NODES[node - HALF]);
     float s = y + half_long * sin(t);
     float half_width = half_short * cos(t);
     float inner = 0.5 * erf_between((x - half_width) / alpha, (x + half_width) / alpha);
-    total += WEIGHTS[node & 7] * cos(t) * exp(-s * s / (alpha * alpha)) * inner;
+    total += WEIGHTS[node & (HALF - 1)] * cos(t) * exp(-s * s / (alpha * alpha)) * inner;
   }
   return total * half_range * half_long / (alpha * sqrt(PI));
 }

@@ -8,6 +8,7 @@ mod claims;
 mod contact_shadows;
 mod deliot_belcour;
 mod displayed;
+mod exactness;
 mod flake_queries;
 mod flakes;
 mod foreign_models;

@@ -3,6 +3,7 @@
 mod bands;
 mod counts;
 mod errors;
+pub mod exactness;
 mod flip;
 mod luminance;
 mod path;

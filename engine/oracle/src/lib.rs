@@ -8,6 +8,7 @@
 //! Radiance is linear RGB, angles are radians unless a name says otherwise.
 
 pub mod albedo;
+pub mod binomial;
 pub mod cone_mean;
 pub mod discrete;
 mod error;

@@ -19,7 +19,8 @@ mod view;
 pub use cache::{Cache, CacheError};
 pub use embedded::{EMBEDDED_SCENES, EmbeddedScene, embedded_scene};
 pub use methods::{
-    COMMON_SETTINGS, Claim, DEFAULT_METHOD, GlintMaterial, JakobTable, METHODS, MethodInfo, Rung, method,
+    COMMON_SETTINGS, Claim, DEFAULT_METHOD, GlintMaterial, JakobTable, METHODS, MethodInfo, Rung,
+    lit_probability_table, method,
 };
 /// What [`Renderer::trace`] reads and writes.
 pub use mica_shaders::types::{Ray, RayAnswer, RayCounts};

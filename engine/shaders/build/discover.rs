@@ -17,9 +17,12 @@ struct Choice {
     key: &'static str,
 }
 
-const CHOICES: [Choice; 2] = [
+const CHOICES: [Choice; 5] = [
     Choice { include: "method.glsl", folder: "methods", key: "method" },
     Choice { include: "occlusion.glsl", folder: "occlusion", key: "occlusion" },
+    Choice { include: "probability.glsl", folder: "rungs/probability", key: "probability" },
+    Choice { include: "count.glsl", folder: "rungs/count", key: "count" },
+    Choice { include: "arithmetic.glsl", folder: "rungs/arithmetic", key: "arithmetic" },
 ];
 
 /// What a per-variant include stands for in one variant.

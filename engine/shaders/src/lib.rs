@@ -8,7 +8,9 @@
 //! - `Params`: its push constants, or `()`.
 //!
 //! A pass that includes `method.glsl` is made once for each file in `methods/`, one that includes `occlusion.glsl` once
-//! for each file in `occlusion/`: the module then has one for each variant, such as `wang2020` or `wang2020_bvh`.
+//! for each file in `occlusion/`: the module then has one for each variant, such as `wang2020` or `wang2020_bvh`. So it is
+//! with `probability.glsl`, `count.glsl` and `arithmetic.glsl`, for each file in `rungs/probability/` and so on: ways to
+//! compute one quantity, which `passes/exactness` measures.
 //! Structs and blocks in buffers are in [`types`], the literal scalar constants of `shared/` in [`constants`], and
 //! [`ALL`] lists every shader.
 //!

@@ -77,6 +77,15 @@ fn an_error_in_one_variant_names_its_file_and_the_variant() {
 }
 
 #[test]
+fn a_choice_may_lie_in_a_folder_of_folders() {
+    let pass = compute(&format!("#include \"count.glsl\"\n{OUT}"), "written[0] = value();");
+    let good = ("rungs/count/good.glsl", "float value() { return 1.0; }\n");
+    let other = ("rungs/arithmetic/other.glsl", "float value() { return 1.0; }\n");
+    let rust = rust(&[("passes/nested/x.comp", &pass), good, other]);
+    assert!(rust.contains("variant: \"count=good\"") && !rust.contains("other"), "{rust}");
+}
+
+#[test]
 fn a_missing_include_is_an_error_at_its_line() {
     let found = problems_of("#include \"shared/absent.glsl\"", "");
     assert!(found[0].starts_with("glsl/passes/x.comp:6: "), "{found:?}");

@@ -1,6 +1,7 @@
 //! The command line: what may be typed, and what it means.
 
 use crate::change::Change;
+use crate::study::Lighting;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use glam::DVec3;
 use mica_render::scene::Light;
@@ -52,7 +53,7 @@ pub struct JsonFlag {
 }
 
 /// A scene, and how it is rendered.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub struct SceneArgs {
     /// An embedded scene (see `mica scenes`) or a .gltf or .glb file.
     #[arg(default_value = "shoe")]
@@ -185,24 +186,42 @@ pub struct ExplainArgs {
 
 /// `mica bench`.
 #[derive(Debug, Args)]
+#[command(
+    after_long_help = "Without --occlusion, every method with every rung of its ladder (see `mica methods`) at every scene, size and \
+    lighting. The time of glints is that of a frame with them less that of the same frame without, in turns in one \
+    run: processor time of the process where the device is the processor, timestamps of the device elsewhere. Figures \
+    are medians over the rounds; after ± stands the farther of least and greatest, which is at least what two runs of \
+    the program differ by. Tables are those a method makes anew when a setting changes, without the compilation of \
+    shaders."
+)]
 pub struct BenchArgs {
     /// What blocks rays: each body that the device offers, on the same rays in the same run. How long it takes to be
     /// ready, how many bytes it keeps, how many rays a second it answers, and how often the bodies disagree.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["method", "lighting"])]
     pub occlusion: bool,
-    /// Embedded scenes or .gltf or .glb files. Default: shoe, and drift with its million triangles.
+    /// Embedded scenes or .gltf or .glb files. Default: shoe; with --occlusion drift too, with its million triangles.
     #[arg(value_name = "SCENE")]
     pub scene: Vec<PathBuf>,
-    /// Rays from what the camera sees: into all directions, and as many at most towards the first light.
-    #[arg(long, value_name = "N", default_value_t = 1 << 18, value_parser = clap::value_parser!(u32).range(1..))]
+    /// A method to measure, with all its rungs (repeatable). Default: all.
+    #[arg(long, value_name = "NAME")]
+    pub method: Vec<String>,
+    /// Which of a scene's lights shine (repeatable): all its `own`, its `lights` without the environment, or its
+    /// `environment` without the lights.
+    #[arg(long, value_enum, default_values_t = [Lighting::Own])]
+    pub lighting: Vec<Lighting>,
+    /// With --occlusion: rays from what the camera sees, into all directions, and as many at most towards the first light.
+    #[arg(long, value_name = "N", default_value_t = 1 << 18, value_parser = clap::value_parser!(u32).range(1..), requires = "occlusion")]
     pub rays: u32,
-    /// Rounds that are measured, after one that warms up. Each builds everything anew.
+    /// Rounds that are measured, after those that warm up: fewer, but at least two, where they take more than 20 seconds.
+    /// With --occlusion all of them, and each builds everything anew.
     #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub rounds: u32,
-    /// Rays of the camera: one through each pixel of a picture of this size.
-    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size, allow_hyphen_values = true)]
-    pub size: [u32; 2],
-    /// Writes a line of JSON for each scene and body; `-` is stdout, in place of the table.
+    /// Size of the picture in pixels (repeatable). Default: 640x360; with --occlusion, one ray of the camera passes
+    /// through each pixel of 1280x720.
+    #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true)]
+    pub size: Vec<[u32; 2]>,
+    /// Appends a line of JSON for each point, and measures no point that is there already; with --occlusion, writes one
+    /// for each scene and body. `-` is stdout, in place of the table.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
     /// A device, by its number or a part of its name or of its driver's name and version (see `mica doctor`). Default:
@@ -225,29 +244,71 @@ pub struct BenchArgs {
 
 /// `mica accuracy`.
 #[derive(Debug, Args)]
+#[command(
+    after_long_help = "A study (-o DIR) compares one frame of every method, with every rung of its ladder (see `mica methods`), with a \
+    reference of the same place, and times it: DIR/points.jsonl has a line for each point, DIR/references.jsonl one for \
+    each place, and each point names the command that renders it. A point that is there already is not measured again, \
+    so that a study goes on after Ctrl-C, a kill or a new scene; scene, lighting, size, method, settings, device, driver, \
+    build and effort decide whether it is the same.\n\n\
+    Glints are the radiance with them less that of the same view without, linear and scene-referred. The reference looks \
+    at every flake in 8x8 and again in 9x9 parts of every pixel (4x4 and 5x5 with --quick), and says how far the two are \
+    apart. W1 is the Wasserstein-1 distance between the luminances of pixels, by the number of flakes in a pixel, over \
+    the reference's mean; mean ratio is over the reference's; FLIP compares the pictures as they are seen. After ± \
+    stands the farther end of an interval of 95 %. The time of glints is that of a frame with them less that of the \
+    same frame without, in turns in one run: processor time of the process where the device is the processor. \
+    Repeating a study changes no error, and no ratio of times by more than its printed spread.\n\n\
+    --quick leaves out the rungs of `jakob` but its draft, which take minutes a frame on a processor, and all scenes but \
+    shoe and plane."
+)]
 pub struct AccuracyArgs {
+    /// Scenes of a study: embedded ones or .gltf or .glb files. Default: all embedded ones but drift; with --quick, shoe
+    /// and plane.
+    #[arg(value_name = "SCENE", conflicts_with_all = ["counts", "exactness", "sheet"])]
+    pub scene: Vec<PathBuf>,
+    /// A folder for what is measured: a study, which goes on where an earlier run of the same command ended. With
+    /// --counts: `counts.jsonl`, a line each row, written as it comes; with --exactness: `exactness.jsonl`, to which lines
+    /// are appended.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
     /// The law of the count: for each method, mean, variance, share of dark pixels and distance from the true
     /// distribution, from a tenth of a flake in a footprint to 100,000, for three materials.
     #[arg(long)]
     pub counts: bool,
+    /// What each exactness costs on its own, without any scene: ways to compute the probability that a flake is lit, the
+    /// number of lit flakes, and formulas in which f32 loses digits, each with its error against f64 and its nanoseconds.
+    #[arg(long)]
+    pub exactness: bool,
     /// A contact sheet of all methods on all embedded scenes but the large one.
     #[arg(long, value_name = "FILE.png")]
     pub sheet: Option<PathBuf>,
-    /// A folder for what is measured: `counts.jsonl`, a line each row, written as it comes.
-    #[arg(short, long, value_name = "DIR")]
-    pub output: Option<PathBuf>,
     /// A method to look at (repeatable). Default: all.
     #[arg(long, value_name = "NAME")]
     pub method: Vec<String>,
-    /// Fewer pixels: larger errors of the figures, in a fraction of the time.
+    /// A study in minutes: two scenes at 320x180, smaller references, fewer rounds, no slow rungs. With --counts: fewer
+    /// pixels, and larger errors of the figures.
     #[arg(long)]
     pub quick: bool,
-    /// Size of a tile of the sheet in pixels.
-    #[arg(long, value_name = "WxH", default_value = "320x180", value_parser = tile, allow_hyphen_values = true)]
-    pub size: [u32; 2],
+    /// Size of the pictures of a study (repeatable; default 640x360, with --quick 320x180), or of a tile of the sheet
+    /// (default 320x180).
+    #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true)]
+    pub size: Vec<[u32; 2]>,
+    /// Which of a scene's lights shine in a study (repeatable): all its `own`, its `lights` without the environment, or
+    /// its `environment` without the lights.
+    #[arg(long, value_enum, default_values_t = [Lighting::Own])]
+    pub lighting: Vec<Lighting>,
+    /// Seconds that the rounds of a point may take, as far as the fewest (5, with --quick 2) fit into them. Default: 20,
+    /// with --quick 1.5.
+    #[arg(long, value_name = "S", value_parser = seconds, allow_hyphen_values = true)]
+    pub seconds: Option<f64>,
+    /// Most rounds of a frame with glints and one without. Default: 15, with --quick 6.
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub rounds: Option<u32>,
     /// Samples of each pixel of the sheet, averaged.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub samples: u32,
+    /// Who answers what blocks light in a study, as in `mica render`.
+    #[arg(long, value_enum, default_value_t = OcclusionChoice::Auto)]
+    pub occlusion: OcclusionChoice,
     /// A device, by its number or a part of its name or of its driver's name and version (see `mica doctor`). Default:
     /// the best there is.
     #[arg(long, value_name = "NAME|INDEX")]
@@ -369,20 +430,19 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     Ok([side(width)?, side(height)?])
 }
 
-/// Larger tiles make a sheet that no program opens.
-const LARGEST_TILE: u32 = 1024;
-
-fn tile(text: &str) -> Result<[u32; 2], String> {
-    let small = |size: &[u32; 2]| size.iter().all(|side| *side <= LARGEST_TILE);
-    size(text).ok().filter(small).ok_or_else(|| format!("expected WIDTHxHEIGHT, each 1 to {LARGEST_TILE}"))
-}
-
 fn finite(text: &str) -> Result<f64, String> {
     text.trim().parse().ok().filter(|number: &f64| number.is_finite()).ok_or_else(|| "expected a finite number".into())
 }
 
 fn exposure(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|stops| stops.abs() <= 32.0).ok_or_else(|| "expected stops from -32 to 32".into())
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    finite(text)
+        .ok()
+        .filter(|seconds| (0.0..=1e6).contains(seconds))
+        .ok_or_else(|| "expected seconds from 0 to 1e6".into())
 }
 
 fn alpha(text: &str) -> Result<f64, String> {

@@ -76,6 +76,12 @@ impl From<RenderError> for Failure {
     }
 }
 
+impl From<mica_accuracy::ErrorsError> for Failure {
+    fn from(error: mica_accuracy::ErrorsError) -> Self {
+        Self::bad_input(error.to_string())
+    }
+}
+
 /// Text that may come from anywhere, fit to be one line of a terminal or a log.
 pub fn one_line(text: &str) -> String {
     let mut line = String::with_capacity(text.len());

@@ -3,6 +3,7 @@
 mod accuracy;
 mod args;
 mod bench;
+mod build;
 mod change;
 mod doctor;
 mod environment_choice;
@@ -22,6 +23,7 @@ mod report_text;
 mod scene_choice;
 mod scenes;
 mod session;
+mod study;
 mod table;
 
 use args::{Cli, Command};

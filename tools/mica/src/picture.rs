@@ -91,7 +91,7 @@ pub fn png_of(rgb: &[u8], [width, height]: [u32; 2]) -> std::result::Result<Vec<
 }
 
 /// Text as EXR attributes hold it; whatever is not ASCII is escaped.
-fn ascii(text: &str) -> Text {
+pub fn ascii(text: &str) -> Text {
     let is_plain = |c: &char| c.is_ascii() && !c.is_ascii_control();
     let plain: String =
         text.chars().flat_map(|c| if is_plain(&c) { vec![c] } else { c.escape_default().collect() }).collect();
@@ -100,7 +100,7 @@ fn ascii(text: &str) -> Text {
 
 /// The same OpenEXR file of one part with its attributes in the order of their names: the writer keeps them in a hash
 /// map, whose order differs from run to run. Nothing else moves, as their sizes stay.
-fn with_sorted_attributes(mut file: Vec<u8>) -> Vec<u8> {
+pub fn with_sorted_attributes(mut file: Vec<u8>) -> Vec<u8> {
     const START: usize = 8;
     let until_zero = |from: usize| file.get(from..)?.iter().position(|byte| *byte == 0).map(|length| from + length + 1);
     let mut attributes: Vec<&[u8]> = Vec::new();

@@ -181,6 +181,11 @@ impl Session {
         Ok(updates)
     }
 
+    /// The same, whatever the cache has: for who wants to know how long it takes.
+    pub fn precompute_anew(&mut self) -> Result<Vec<Update>, Failure> {
+        Ok(self.renderer.precompute(&mut self.executor, None, &mut |_, _, _| {})?)
+    }
+
     /// Declares a frame. With `sample`, it shows the mean of itself and the samples before it.
     pub fn declare(&mut self, sample: Option<u32>) -> Result<Declared, Failure> {
         let view = sample.map_or_else(|| self.view.clone(), |sample| self.view.sample(sample));

@@ -15,6 +15,7 @@ mod wang2020;
 mod wang_bowles;
 mod zirr_kaplanyan;
 
+pub use dpf::lit_probability_table;
 pub use jakob::JakobTable;
 
 use crate::environment_tables::EnvironmentTables;

@@ -1,26 +1,37 @@
 //! `mica accuracy`: what methods show, against the truth and against each other.
 
 mod counts;
+mod exactness;
 mod sheet;
 
 use crate::args::AccuracyArgs;
 use crate::error::Failure;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
+use crate::study;
 use mica_render::{METHODS, MethodInfo, method};
 
 /// Does what was asked for.
 pub fn accuracy(args: &AccuracyArgs) -> Result<(), Failure> {
-    if !args.counts && args.sheet.is_none() {
-        return Err(Failure::bad_input("nothing to do: give --counts, --sheet FILE.png, or both"));
+    let is_study = !args.counts && !args.exactness && args.sheet.is_none();
+    if is_study && args.output.is_none() {
+        return Err(Failure::bad_input(
+            "nothing to do: give -o DIR for a study, --counts, --exactness, or --sheet FILE.png",
+        ));
     }
     let methods = chosen(&args.method)?;
     let interrupt = Interrupt::new()?;
     let mut progress = Progress::new(args.quiet);
+    if let Some(folder) = args.output.as_deref().filter(|_| is_study) {
+        return study::study(args, folder, &methods, &interrupt, &mut progress);
+    }
     // A file that cannot be written is known before anything is computed.
-    let sheet = args.sheet.as_deref().map(sheet::Sheet::check).transpose()?;
+    let sheet = args.sheet.as_deref().map(|path| sheet::Sheet::check(path, &args.size)).transpose()?;
     if args.counts {
         counts::counts(args, &methods, &interrupt, &mut progress)?;
+    }
+    if args.exactness {
+        exactness::exactness(args, true, &interrupt, &mut progress)?;
     }
     if let Some(sheet) = sheet {
         sheet.draw(args, &methods, &interrupt, &mut progress)?;
@@ -29,7 +40,7 @@ pub fn accuracy(args: &AccuracyArgs) -> Result<(), Failure> {
 }
 
 /// The methods of these names, or all.
-fn chosen(names: &[String]) -> Result<Vec<&'static MethodInfo>, Failure> {
+pub fn chosen(names: &[String]) -> Result<Vec<&'static MethodInfo>, Failure> {
     if names.is_empty() {
         return Ok(METHODS.iter().collect());
     }

@@ -18,6 +18,9 @@ const GAP: u32 = 8;
 const CHARACTER: u32 = 16;
 const PAPER: [u8; 3] = [24, 24, 26];
 const INK: [u8; 3] = [225, 225, 220];
+/// Size of a tile where none is named, and the largest: larger tiles make a sheet that no program opens.
+const TILE: [u32; 2] = [320, 180];
+const LARGEST_TILE: u32 = 1024;
 /// What stands for a tile that could not be rendered.
 const MISSING: [u8; 3] = [70, 30, 30];
 
@@ -29,15 +32,24 @@ fn scenes() -> Vec<&'static EmbeddedScene> {
 /// A sheet to be written.
 pub struct Sheet {
     destination: Destination,
+    tile: [u32; 2],
 }
 
 impl Sheet {
     /// Checks, before any work is done, that the file can be written.
-    pub fn check(path: &Path) -> Result<Self, Failure> {
+    pub fn check(path: &Path, sizes: &[[u32; 2]]) -> Result<Self, Failure> {
         if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("png")) {
             return Err(Failure::bad_input(format!("--sheet {}: a sheet is a .png file", path.display())));
         }
-        Ok(Self { destination: Destination::check(path)? })
+        let tile = match sizes {
+            [] => TILE,
+            [tile] if tile.iter().all(|side| *side <= LARGEST_TILE) => *tile,
+            _ => {
+                let wanted = format!("tiles of a sheet have one --size, each side at most {LARGEST_TILE}");
+                return Err(Failure::bad_input(wanted));
+            }
+        };
+        Ok(Self { destination: Destination::check(path)?, tile })
     }
 
     /// Renders all tiles and writes the sheet; after Ctrl-C, with those that were finished.
@@ -48,13 +60,13 @@ impl Sheet {
         interrupt: &Interrupt,
         progress: &mut Progress,
     ) -> Result<(), Failure> {
-        let mut canvas = Canvas::new(args.size, methods);
+        let mut canvas = Canvas::new(self.tile, methods);
         let total = (scenes().len() * methods.len()) as u64;
         let mut done = 0;
         let mut failed = None;
         interrupt.defer();
         'scenes: for (column, scene) in scenes().into_iter().enumerate() {
-            let mut session = Session::new(&scene_args(args, scene.name), progress)?;
+            let mut session = Session::new(&self.scene_args(args, scene.name), progress)?;
             for (row, method) in methods.iter().enumerate() {
                 if interrupt.requested() {
                     break 'scenes;
@@ -84,17 +96,17 @@ impl Sheet {
         }
         failed.map_or(Ok(()), Err)
     }
-}
 
-fn scene_args(args: &AccuracyArgs, scene: &str) -> SceneArgs {
-    SceneArgs {
-        size: args.size,
-        device: args.device.clone(),
-        memory: args.memory,
-        validation: args.validation,
-        cache: args.cache.clone(),
-        no_cache: args.no_cache,
-        ..SceneArgs::of(scene)
+    fn scene_args(&self, args: &AccuracyArgs, scene: &str) -> SceneArgs {
+        SceneArgs {
+            size: self.tile,
+            device: args.device.clone(),
+            memory: args.memory,
+            validation: args.validation,
+            cache: args.cache.clone(),
+            no_cache: args.no_cache,
+            ..SceneArgs::of(scene)
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! `mica bench`: how long the renderer's parts take, measured alone.
 
 mod body;
+mod methods;
 mod occlusion;
 mod rays;
 mod report;
@@ -11,8 +12,5 @@ use crate::error::Failure;
 
 /// Measures what was asked for.
 pub fn bench(args: &BenchArgs) -> Result<(), Failure> {
-    if !args.occlusion {
-        return Err(Failure::bad_input("nothing to do: give --occlusion"));
-    }
-    occlusion::occlusion(args)
+    if args.occlusion { occlusion::occlusion(args) } else { methods::methods(args) }
 }

@@ -36,6 +36,7 @@ pub fn occlusion(args: &BenchArgs) -> Result<(), Failure> {
     let kept = cache(args.cache.as_deref(), args.no_cache);
     let mut bench = Bench {
         args,
+        size: camera_size(args)?,
         offered: vec![OcclusionBackend::Bvh],
         not_offered: Vec::new(),
         on_processor: device.info().kind == DeviceKind::Cpu,
@@ -101,11 +102,20 @@ pub fn occlusion(args: &BenchArgs) -> Result<(), Failure> {
     }
 }
 
+/// Pixels of the camera's picture, of which each has a ray.
+fn camera_size(args: &BenchArgs) -> Result<[u32; 2], Failure> {
+    match args.size[..] {
+        [] => Ok([1280, 720]),
+        [size] => Ok(size),
+        _ => Err(Failure::bad_input("--occlusion takes one --size")),
+    }
+}
+
 /// Says early what no device would be given.
 fn check_counts(args: &BenchArgs, device: &DeviceInfo) -> Result<(), Failure> {
     let each = size_of::<Ray>().max(size_of::<RayAnswer>()) as u64;
     let most = device.limits.max_storage_buffer_range_bytes / each;
-    let [width, height] = args.size;
+    let [width, height] = camera_size(args)?;
     let pixels = u64::from(width) * u64::from(height);
     for (option, count) in
         [(format!("--rays {}", args.rays), args.rays.into()), (format!("--size {width}x{height}"), pixels)]
@@ -122,6 +132,8 @@ fn check_counts(args: &BenchArgs, device: &DeviceInfo) -> Result<(), Failure> {
 
 struct Bench<'a> {
     args: &'a BenchArgs,
+    /// Of the camera's picture.
+    size: [u32; 2],
     /// The first of them is the one that every device has.
     offered: Vec<OcclusionBackend>,
     /// The others, and what the device lacks for them.
@@ -162,7 +174,7 @@ impl Bench<'_> {
     /// Measures one scene; nothing if Ctrl-C came before the first round was done.
     fn scene(&mut self, choice: &Path) -> Result<Option<SceneReport>, Failure> {
         let chosen = scene_choice::load(choice, &mut self.progress)?;
-        let view = View::new(chosen.scene.default_camera(), self.args.size);
+        let view = View::new(chosen.scene.default_camera(), self.size);
         let light = chosen.scene.lights.first().copied();
         let scene = bare(chosen.scene);
         let mut left_out = Vec::new();
@@ -179,7 +191,7 @@ impl Bench<'_> {
             triangles_placed: scene.triangle_count(),
             meshes: scene.meshes.len(),
             instances: scene.instances.len(),
-            size: self.args.size,
+            size: self.size,
             rounds: Rounds { warmup: WARMUP, measured },
             bodies: Vec::new(),
             left_out,

@@ -28,6 +28,31 @@ fn counts_say_how_far_a_method_is_from_the_law() {
     }
 }
 
+/// Each rung is in the table and in the file, and a second run appends to what is there.
+#[test]
+fn exactness_is_appended_to_the_folder_of_a_study() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = in_folder(folder.path(), "exactness.jsonl");
+    let earlier = "{\"schema\":\"other\"}\n";
+    std::fs::write(&path, earlier).expect("a file");
+    let output = folder.path().to_str().expect("temporary folders have plain names");
+    let text = succeeded(run(&["accuracy", "--exactness", "--quick", "-o", output]));
+    let lines = std::fs::read_to_string(&path).expect("lines");
+    let added = lines.strip_prefix(earlier).expect("what was there stays");
+    let mut charts = std::collections::BTreeSet::new();
+    for line in added.lines().map(json) {
+        let word = |key: &str| line[key].as_str().unwrap_or_else(|| panic!("{key} in {line}")).to_owned();
+        assert_eq!(word("schema"), "mica-exactness-1");
+        assert!(text.contains(&word("rung")) && text.contains(&word("case")) && text.contains(&word("per")), "{line}");
+        assert!(line["error"]["value"].is_f64() && line["ns"]["value"].is_f64(), "{line}");
+        assert!(line["machine"]["build"].is_string(), "{line}");
+        charts.insert(word("chart"));
+    }
+    for chart in ["lit_probability", "count_law", "arithmetic"] {
+        assert!(charts.contains(chart) && text.contains(chart), "{chart} in {charts:?}");
+    }
+}
+
 #[test]
 fn a_sheet_shows_each_method_on_each_scene() {
     let folder = tempfile::tempdir().expect("a temporary folder");

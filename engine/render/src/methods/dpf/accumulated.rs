@@ -17,8 +17,7 @@ pub(in crate::methods) struct Accumulated {
 impl Accumulated {
     /// A table that the first update fills.
     pub fn new(material: &str) -> Self {
-        let bytes = u64::from(c::DPF_ENTRIES) * 4;
-        Self { table: Buffer::new(format!("dpf_accumulated {material}"), bytes, Lifetime::Settings), made_for: None }
+        Self { table: table(&format!("dpf_accumulated {material}")), made_for: None }
     }
 
     /// Declares the pass that fills it if anything that it depends on changed, and says what that is now. `dpf` holds
@@ -42,23 +41,39 @@ impl Accumulated {
             None => format!("first frame with alpha {alpha}, gamma {gamma_deg} degrees"),
         };
         g.because(format!("material {}: {change}", material.name));
-        let (low, part) = bracket(alphas, alpha as f32);
-        let high = (low + 1).min(alphas.len() - 1);
-        let [first_offset, last_offset] = accumulation_offsets(gamma_deg);
-        let degrees = f64::from(last_offset - first_offset + 1);
-        let params = dpf_accumulate::Params {
-            low: low as u32 * c::DPF_ENTRIES,
-            high: high as u32 * c::DPF_ENTRIES,
-            part,
-            first_offset,
-            last_offset,
-            scale: (gamma_deg / degrees).powi(2) as f32,
-        };
-        let bind = dpf_accumulate::Bind { dpf, accumulated: &mut self.table };
-        g.pass(bind, params, Extent::line(c::DPF_ENTRIES));
+        accumulate(g, (alphas, dpf), alpha, gamma_deg, &mut self.table);
         self.made_for = Some(key);
         key
     }
+}
+
+/// An accumulated table, not filled yet.
+pub(super) fn table(name: &str) -> Buffer {
+    Buffer::new(name, u64::from(c::DPF_ENTRIES) * 4, Lifetime::Settings)
+}
+
+/// Declares the pass that fills an accumulated table from tables at some roughnesses.
+pub(super) fn accumulate(
+    g: &mut Graph,
+    (alphas, dpf): (&[f32], &Buffer),
+    alpha: f64,
+    gamma_deg: f64,
+    accumulated: &mut Buffer,
+) {
+    let (low, part) = bracket(alphas, alpha as f32);
+    let high = (low + 1).min(alphas.len() - 1);
+    let [first_offset, last_offset] = accumulation_offsets(gamma_deg);
+    let degrees = f64::from(last_offset - first_offset + 1);
+    let params = dpf_accumulate::Params {
+        low: low as u32 * c::DPF_ENTRIES,
+        high: high as u32 * c::DPF_ENTRIES,
+        part,
+        first_offset,
+        last_offset,
+        scale: (gamma_deg / degrees).powi(2) as f32,
+    };
+    let bind = dpf_accumulate::Bind { dpf, accumulated };
+    g.pass(bind, params, Extent::line(c::DPF_ENTRIES));
 }
 
 /// The table below a roughness, and the weight of the one above; beyond the ends, the end.

@@ -78,6 +78,15 @@ pub(super) fn quadrature(g: &mut Graph, alphas: &[f32]) -> Buffer {
     tables
 }
 
+/// Declares the passes that make P(i, o, gamma) at one roughness as `wang2020` looks it up (`shared/accumulated_dpf.glsl`),
+/// from 1-degree tables at `alphas` by quadrature.
+pub fn lit_probability_table(g: &mut Graph, alphas: &[f32], alpha: f64, gamma_deg: f64) -> Buffer {
+    let dpf = quadrature(g, alphas);
+    let mut table = accumulated::table("lit_probability_table");
+    accumulated::accumulate(g, (alphas, &dpf), alpha, gamma_deg, &mut table);
+    table
+}
+
 /// Makes the tables on a device of our own, or takes them from the cache, and keeps them there.
 pub(super) fn precompute(
     source: DpfSource,

@@ -1,0 +1,6 @@
+// D of Beckmann with the sine from the cross product.
+#include "shared/microfacet.glsl"
+
+float value(vec4 a, vec4 b, vec4 c) {
+  return beckmann_d(a.xyz, b.xyz, a.w);
+}

@@ -1,0 +1,6 @@
+// A Gaussian as wide as lobe and cone together.
+#include "shared/lit_probability_ellipse.glsl"
+
+float probability(vec3 i, vec3 o, float sin2_half_gamma, float alpha) {
+  return lit_probability_gaussian(i, o, sin2_half_gamma, alpha);
+}

@@ -1,0 +1,104 @@
+//! `mica accuracy --exactness`: what each exactness costs on its own, error against nanoseconds.
+
+use crate::args::AccuracyArgs;
+use crate::error::{Failure, INTERRUPTED};
+use crate::interrupt::Interrupt;
+use crate::output;
+use crate::progress::Progress;
+use crate::session::{cache, executor};
+use crate::study::{Lines, machine};
+use crate::table::{Column, table};
+use mica_accuracy::exactness::{Chart, Effort, ExactnessError, ExactnessLine, measure};
+use mica_gpu::{Device, DeviceOptions};
+use std::path::Path;
+
+/// The file of a study's folder.
+const FILE: &str = "exactness.jsonl";
+
+/// Measures, appends to the file and prints, a chart at a time: all of them `anew`, or those that the folder has no lines
+/// of from this machine. What was measured before Ctrl-C or a failure is kept.
+pub fn exactness(
+    args: &AccuracyArgs,
+    anew: bool,
+    interrupt: &Interrupt,
+    progress: &mut Progress,
+) -> Result<(), Failure> {
+    let mut lines = args.output.as_deref().map(open).transpose()?;
+    let device = Device::new(&DeviceOptions { select: args.device.clone(), validation: args.validation })?;
+    let machine = machine(device.info(), "none");
+    let kept = cache(args.cache.as_deref(), args.no_cache);
+    let mut executor = executor(device, kept.as_ref(), args.memory)?;
+    let effort = if args.quick { Effort::QUICK } else { Effort::FULL };
+    let is_there = |chart: Chart| {
+        let all = lines.iter().flat_map(|lines| &lines.all);
+        all.filter(|line| line.machine == machine).any(|line| line.chart == chart.name())
+    };
+    let wanted: Vec<Chart> = Chart::ALL.into_iter().filter(|chart| anew || !is_there(*chart)).collect();
+    interrupt.defer();
+    for (done, chart) in wanted.iter().enumerate() {
+        if interrupt.requested() {
+            let why = format!("interrupted after {done} of {} charts, which were kept", wanted.len());
+            return Err(Failure::with_code(INTERRUPTED, why));
+        }
+        let mut show = |what: &str, done, total| progress.update(what, done, total);
+        let measured = measure(*chart, &mut executor, &effort, &machine, &mut show)?;
+        progress.clear();
+        if let Some(lines) = &mut lines {
+            measured.iter().try_for_each(|line| lines.add(line.clone()))?;
+        }
+        if !args.quiet {
+            output::print(&for_people(*chart, &measured))?;
+        }
+    }
+    match args.output.as_deref().filter(|_| !args.quiet && !wanted.is_empty()) {
+        Some(folder) => output::print(&format!("{}\n", folder.join(FILE).display())),
+        None => Ok(()),
+    }
+}
+
+fn open(folder: &Path) -> Result<Lines<ExactnessLine>, Failure> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Failure::bad_input(format!("{}: {error}; name a folder", folder.display())))?;
+    Lines::open(&folder.join(FILE))
+}
+
+impl From<ExactnessError> for Failure {
+    fn from(error: ExactnessError) -> Self {
+        match error {
+            ExactnessError::Gpu(error) => error.into(),
+            ExactnessError::Oracle(error) => Self::bad_input(error.to_string()),
+            error @ ExactnessError::NoClock { .. } => Self::with_code(3, error.to_string()),
+        }
+    }
+}
+
+/// A chart as a table, each case with what its errors are of.
+fn for_people(chart: Chart, lines: &[ExactnessLine]) -> String {
+    let cells: Vec<Vec<String>> = lines
+        .iter()
+        .enumerate()
+        .map(|(index, line)| {
+            let is_first = index == 0 || lines[index - 1].case != line.case;
+            vec![
+                if is_first { line.case.clone() } else { String::new() },
+                line.rung.clone(),
+                format!("{:.1e}", line.error.value),
+                format!("{:.1e}", line.error.high),
+                format!("{:.2}", line.ns.value),
+                format!("{:.2} to {:.2}", line.ns.low, line.ns.high),
+                if is_first { line.error_of.clone() } else { String::new() },
+            ]
+        })
+        .collect();
+    let columns = [
+        Column::Left(chart.name()),
+        Column::Left("rung"),
+        Column::Right("error"),
+        Column::Right("high"),
+        Column::Right("ns"),
+        Column::Right("least to most"),
+        Column::Left("error of"),
+    ];
+    let per = lines.first().map(|line| line.per.clone()).unwrap_or_default();
+    format!("{}ns: of {per}\n\n", table(&columns, &cells))
+}

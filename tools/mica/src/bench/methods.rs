@@ -1,0 +1,142 @@
+//! `mica bench`: what every method costs with every rung of its ladder, at every scene, size and lighting.
+
+use crate::accuracy::chosen;
+use crate::args::{BenchArgs, SceneArgs};
+use crate::error::{Failure, INTERRUPTED};
+use crate::interrupt::Interrupt;
+use crate::output;
+use crate::progress::Progress;
+use crate::study::{Effort, Lines, OpenPlace, Stop, measure, rungs, stops, table_of, unmeasured};
+use mica_accuracy::Point;
+use mica_render::{MethodInfo, Rung};
+use std::path::{Path, PathBuf};
+
+/// What is measured where nobody says.
+const DEFAULT_SCENE: &str = "shoe";
+const DEFAULT_SIZE: [u32; 2] = [640, 360];
+/// Seconds that the rounds of a point may take, if there are two at least.
+const SECONDS: f64 = 20.0;
+
+/// Measures, writes and prints. What was measured before Ctrl-C or a failure is kept.
+pub fn methods(args: &BenchArgs) -> Result<(), Failure> {
+    let methods = chosen(&args.method)?;
+    let interrupt = Interrupt::new()?;
+    let to_stdout = args.json.as_deref() == Some(Path::new("-"));
+    let lines = args.json.as_deref().filter(|_| !to_stdout).map(Lines::open).transpose()?;
+    let scenes = if args.scene.is_empty() { vec![PathBuf::from(DEFAULT_SCENE)] } else { args.scene.clone() };
+    let sizes = if args.size.is_empty() { vec![DEFAULT_SIZE] } else { args.size.clone() };
+    let mut bench = Bench {
+        args,
+        effort: Effort { seconds: SECONDS, rounds: [args.rounds.min(2), args.rounds], ..Effort::full() },
+        rungs: rungs(&methods, false),
+        interrupt: &interrupt,
+        progress: Progress::new(args.quiet),
+        to_stdout,
+        lines,
+        worst: None,
+        measured: 0,
+    };
+    interrupt.defer();
+    let finished = stops(&scenes, &sizes, &args.lighting).iter().try_for_each(|stop| bench.stop(stop));
+    bench.progress.clear();
+    if let Some(path) = args.json.as_deref().filter(|_| !(args.quiet || to_stdout)) {
+        output::print(&format!("\n{}: {} points measured\n", path.display(), bench.measured))?;
+    }
+    finished?;
+    bench.worst.map_or(Ok(()), Err)
+}
+
+struct Bench<'a> {
+    args: &'a BenchArgs,
+    effort: Effort,
+    rungs: Vec<(&'static MethodInfo, &'static Rung)>,
+    interrupt: &'a Interrupt,
+    progress: Progress,
+    to_stdout: bool,
+    lines: Option<Lines<Point>>,
+    /// Of the points that could not be measured.
+    worst: Option<Failure>,
+    measured: usize,
+}
+
+impl Bench<'_> {
+    /// All points of a place. One that cannot be measured is reported, and the others go on.
+    fn stop(&mut self, stop: &Stop) -> Result<(), Failure> {
+        let BenchArgs { device, memory, cache, no_cache, .. } = self.args;
+        let scene = SceneArgs {
+            scene: stop.scene.clone(),
+            size: stop.size,
+            device: device.clone(),
+            memory: *memory,
+            cache: cache.clone(),
+            no_cache: *no_cache,
+            ..SceneArgs::of("")
+        };
+        let mut open = None;
+        let mut points = Vec::new();
+        for (index, (method, rung)) in self.rungs.clone().into_iter().enumerate() {
+            if self.interrupt.requested() {
+                break;
+            }
+            // After a failure the place is opened anew, as frames may be lost with it.
+            let place = match &mut open {
+                Some(place) => place,
+                none => match OpenPlace::open(&scene, stop.lighting, &mut self.progress) {
+                    Ok(place) => none.insert(place),
+                    Err(failure) => {
+                        self.report(&stop.scene.display().to_string(), failure);
+                        break;
+                    }
+                },
+            };
+            let wanted = unmeasured(place, method, rung, &self.effort.of_times());
+            let all = self.lines.as_ref().map_or(&[][..], |lines| &lines.all);
+            if let Some(point) = all.iter().rev().find(|point| point.is_same_as(&wanted)) {
+                points.push(point.clone());
+                continue;
+            }
+            let what = format!("{} by {}", place.place.scene, wanted.name());
+            let title = format!("{what} ({} of {})", index + 1, self.rungs.len());
+            let (effort, interrupt) = (&self.effort, self.interrupt);
+            match self.progress.during(&title, || measure(place, method, rung, None, effort, interrupt)) {
+                Ok(measured) => {
+                    points.push(measured.point.clone());
+                    self.keep(measured.point)?;
+                }
+                Err(failure) if failure.code == INTERRUPTED => {}
+                Err(failure) => {
+                    self.report(&what, failure);
+                    open = None;
+                }
+            }
+        }
+        self.show(&points)?;
+        if self.interrupt.requested() {
+            let message = format!("interrupted after {} points, which were kept", self.measured);
+            return Err(Failure::with_code(INTERRUPTED, message));
+        }
+        Ok(())
+    }
+
+    fn keep(&mut self, point: Point) -> Result<(), Failure> {
+        self.measured += 1;
+        if self.to_stdout {
+            let line = serde_json::to_string(&point).map_err(|error| Failure::bad_input(error.to_string()))?;
+            output::print(&(line + "\n"))?;
+        }
+        self.lines.as_mut().map_or(Ok(()), |lines| lines.add(point))
+    }
+
+    fn show(&mut self, points: &[Point]) -> Result<(), Failure> {
+        self.progress.clear();
+        if self.args.quiet || self.to_stdout { Ok(()) } else { output::print(&table_of(points)) }
+    }
+
+    fn report(&mut self, what: &str, failure: Failure) {
+        self.progress.clear();
+        log::warn!("{what} is left out: {failure}");
+        if self.worst.as_ref().is_none_or(|worst| worst.code < failure.code) {
+            self.worst = Some(failure);
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! A study: every method with every rung of its ladder at every place, its error and its time, kept line by line.
+
+mod effort;
+mod measure;
+mod path;
+mod pixels;
+mod place;
+mod plan;
+mod reference;
+pub mod reference_file;
+mod run;
+mod store;
+mod tables;
+mod timing;
+
+pub use effort::Effort;
+pub use measure::{Measured, measure, unmeasured};
+pub use place::{Lighting, OpenPlace, machine};
+pub use plan::{Stop, rungs, stops};
+pub use reference::{Reference, ReferencePixels};
+pub use run::study;
+pub use store::{Folder, Lines};
+pub use tables::of_place as table_of;
+pub use timing::{Clock, paired};

@@ -1,0 +1,209 @@
+//! `mica accuracy -o DIR`: measures what is missing in a study, and keeps every point as soon as it is finished.
+
+use super::effort::Effort;
+use super::measure::{measure, unmeasured};
+use super::place::OpenPlace;
+use super::plan::{self, Stop};
+use super::reference::Reference;
+use super::store::{Folder, picture_names, reference_names};
+use super::tables;
+use crate::args::{AccuracyArgs, SceneArgs};
+use crate::error::{Failure, INTERRUPTED};
+use crate::interrupt::Interrupt;
+use crate::output;
+use crate::progress::Progress;
+use mica_accuracy::Point;
+use mica_render::{MethodInfo, Rung};
+use std::path::Path;
+
+/// Measures, keeps, prints and draws.
+pub fn study(
+    args: &AccuracyArgs,
+    folder: &Path,
+    methods: &[&'static MethodInfo],
+    interrupt: &Interrupt,
+    progress: &mut Progress,
+) -> Result<(), Failure> {
+    let mut folder = Folder::open(folder)?;
+    let scenes = if args.scene.is_empty() { plan::scenes(args.quick) } else { args.scene.clone() };
+    let default_size = if args.quick { [320, 180] } else { [640, 360] };
+    let sizes = if args.size.is_empty() { vec![default_size] } else { args.size.clone() };
+    let stops = plan::stops(&scenes, &sizes, &args.lighting);
+    let effort = effort(args);
+    interrupt.defer();
+    let mut run = Run {
+        args,
+        effort: &effort,
+        rungs: plan::rungs(methods, args.quick),
+        interrupt,
+        progress,
+        folder: &mut folder,
+        worst: None,
+        measured: 0,
+    };
+    let finished = stops.iter().try_for_each(|stop| run.stop(stop));
+    let (measured, worst) = (run.measured, run.worst.take());
+    progress.clear();
+    if !args.quiet {
+        let path = folder.path.join("points.jsonl");
+        let all = folder.points.all.len();
+        output::print(&format!("\n{}: {measured} points measured, {all} in all\n", path.display()))?;
+    }
+    match (finished, worst) {
+        (Err(failure), _) if failure.code == INTERRUPTED => {
+            let message = format!("interrupted after {measured} points, which were kept; the same command goes on");
+            Err(Failure::with_code(INTERRUPTED, message))
+        }
+        (Err(failure), _) | (Ok(()), Some(failure)) => Err(failure),
+        (Ok(()), None) => Ok(()),
+    }
+}
+
+/// How much work the command line asks for.
+fn effort(args: &AccuracyArgs) -> Effort {
+    let mut effort = if args.quick { Effort::quick() } else { Effort::full() };
+    effort.seconds = args.seconds.unwrap_or(effort.seconds);
+    if let Some(most) = args.rounds {
+        effort.rounds = [effort.rounds[0].min(most), most];
+    }
+    effort
+}
+
+struct Run<'a> {
+    args: &'a AccuracyArgs,
+    effort: &'a Effort,
+    rungs: Vec<(&'static MethodInfo, &'static Rung)>,
+    interrupt: &'a Interrupt,
+    progress: &'a mut Progress,
+    folder: &'a mut Folder,
+    /// Of the points that could not be measured.
+    worst: Option<Failure>,
+    measured: usize,
+}
+
+impl Run<'_> {
+    /// A place with all its points. One that cannot be measured is reported, and the others go on.
+    ///
+    /// # Errors
+    /// An interrupt, and whatever keeps results from being kept.
+    fn stop(&mut self, stop: &Stop) -> Result<(), Failure> {
+        let mut next = 0;
+        let mut shown = Vec::new();
+        while next < self.rungs.len() {
+            // After a failure the place is opened anew, as frames may be lost with it.
+            match self.stop_from(stop, &mut next, &mut shown) {
+                Ok(()) => break,
+                Err(Stopped::For(failure)) => {
+                    self.show(&shown)?;
+                    return Err(failure);
+                }
+                Err(Stopped::At(what, failure)) => self.report(&what, failure),
+                Err(Stopped::Place(failure)) => {
+                    self.report(&stop.scene.display().to_string(), failure);
+                    break;
+                }
+            }
+        }
+        self.show(&shown)
+    }
+
+    fn stop_from(&mut self, stop: &Stop, next: &mut usize, shown: &mut Vec<Point>) -> Result<(), Stopped> {
+        self.check_interrupt()?;
+        let scene = SceneArgs {
+            scene: stop.scene.clone(),
+            size: stop.size,
+            occlusion: self.args.occlusion,
+            device: self.args.device.clone(),
+            memory: self.args.memory,
+            validation: self.args.validation,
+            cache: self.args.cache.clone(),
+            no_cache: self.args.no_cache,
+            ..SceneArgs::of("")
+        };
+        let mut open = OpenPlace::open(&scene, stop.lighting, self.progress).map_err(Stopped::Place)?;
+        let mut reference = None;
+        while let Some((method, rung)) = self.rungs.get(*next).copied() {
+            self.check_interrupt()?;
+            *next += 1;
+            let wanted = unmeasured(&open, method, rung, &self.effort.describe());
+            // The last of several lines counts, here as in the report.
+            if let Some(point) = self.folder.points.all.iter().rev().find(|point| point.is_same_as(&wanted)) {
+                shown.push(point.clone());
+                continue;
+            }
+            if reference.is_none() {
+                reference = Some(self.reference(&mut open)?);
+            }
+            let what = format!("{} by {}", open.place.scene, wanted.name());
+            let title = format!("{what} ({next} of {})", self.rungs.len());
+            let (effort, interrupt) = (self.effort, self.interrupt);
+            let measured = self
+                .progress
+                .during(&title, || measure(&mut open, method, rung, reference.as_ref(), effort, interrupt))
+                .map_err(|failure| match failure.code {
+                    INTERRUPTED => Stopped::For(failure),
+                    _ => Stopped::At(what, failure),
+                })?;
+            let mut point = measured.point;
+            if let Some(pictures) = measured.pictures {
+                let names = picture_names(&point);
+                for (name, bytes) in names.iter().zip(&pictures) {
+                    self.folder.write(name, bytes).map_err(Stopped::For)?;
+                }
+                point.pictures = Some(names);
+            }
+            self.folder.points.add(point.clone()).map_err(Stopped::For)?;
+            self.measured += 1;
+            shown.push(point);
+        }
+        Ok(())
+    }
+
+    /// The reference of a place: the one that was kept, or a new one.
+    fn reference(&mut self, open: &mut OpenPlace) -> Result<Reference, Stopped> {
+        let of_place = |failure: Failure| {
+            if failure.code == INTERRUPTED { Stopped::For(failure) } else { Stopped::Place(failure) }
+        };
+        if let Some((line, pixels)) = self.folder.reference(open, self.effort) {
+            return Reference::of_stored(open, self.effort, line, pixels).map_err(of_place);
+        }
+        let names = reference_names(&open.place);
+        let reference = Reference::render(open, self.effort, names, self.interrupt, self.progress).map_err(of_place)?;
+        self.progress.clear();
+        self.folder.keep_reference(&reference, open.session.view.exposure).map_err(Stopped::For)?;
+        Ok(reference)
+    }
+
+    fn check_interrupt(&self) -> Result<(), Stopped> {
+        if self.interrupt.requested() {
+            return Err(Stopped::For(Failure::with_code(INTERRUPTED, "interrupted")));
+        }
+        Ok(())
+    }
+
+    fn report(&mut self, what: &str, failure: Failure) {
+        self.progress.clear();
+        log::warn!("{what} is left out: {failure}");
+        if self.worst.as_ref().is_none_or(|worst| worst.code < failure.code) {
+            self.worst = Some(failure);
+        }
+    }
+
+    fn show(&mut self, points: &[Point]) -> Result<(), Failure> {
+        self.progress.clear();
+        if self.args.quiet || points.is_empty() {
+            return Ok(());
+        }
+        output::print(&tables::of_place(points))
+    }
+}
+
+/// Why a place was left before its last point.
+enum Stopped {
+    /// Nothing more can be done at all.
+    For(Failure),
+    /// One point cannot be measured.
+    At(String, Failure),
+    /// The whole place cannot.
+    Place(Failure),
+}

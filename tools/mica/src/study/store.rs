@@ -1,0 +1,234 @@
+//! A folder of a study: lines that are only ever appended, and files that are whole or not there.
+
+use super::effort::Effort;
+use super::place::OpenPlace;
+use super::reference::{Reference, ReferencePixels};
+use super::reference_file;
+use crate::error::Failure;
+use crate::output::Destination;
+use mica_accuracy::{Machine, Place, Point, ReferenceLine};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// A file of JSON lines that this process alone appends to.
+pub struct Lines<T> {
+    path: PathBuf,
+    file: File,
+    /// All lines, those of earlier runs first.
+    pub all: Vec<T>,
+}
+
+impl<T: Serialize + DeserializeOwned> Lines<T> {
+    /// Opens or makes the file. A last line that was cut short is taken off; any other line that is not what it should
+    /// be is left where it is, and not heard of again.
+    ///
+    /// # Errors
+    /// If the file cannot be read and written, or another process has it.
+    pub fn open(path: &Path) -> Result<Self, Failure> {
+        let failed = |error: std::io::Error| Failure::bad_input(format!("{}: {error}", path.display()));
+        let mut file =
+            OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                let path = path.display();
+                return Err(Failure::bad_input(format!(
+                    "{path}: another mica is writing it; wait for it, or name another"
+                )));
+            }
+            Err(TryLockError::Error(error)) => return Err(failed(error)),
+        }
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).map_err(failed)?;
+        let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
+        if whole < bytes.len() {
+            log::info!("{}: the last line was cut short and is taken off", path.display());
+            file.set_len(whole as u64).map_err(failed)?;
+        }
+        file.seek(SeekFrom::End(0)).map_err(failed)?;
+        let mut all = Vec::new();
+        for (index, line) in bytes[..whole].split(|byte| *byte == b'\n').enumerate() {
+            match serde_json::from_slice(line) {
+                Ok(line) => all.push(line),
+                Err(_) if line.iter().all(u8::is_ascii_whitespace) => {}
+                Err(error) => log::warn!("{}, line {}: {error}; it is passed over", path.display(), index + 1),
+            }
+        }
+        Ok(Self { path: path.to_owned(), file, all })
+    }
+
+    /// Appends a line, which is on its way to the disk before this returns.
+    pub fn add(&mut self, line: T) -> Result<(), Failure> {
+        let failed = |error: String| Failure::bad_input(format!("{} cannot be written: {error}", self.path.display()));
+        let mut text = serde_json::to_string(&line).map_err(|error| failed(error.to_string()))?;
+        text.push('\n');
+        // In one call, so that what a kill cuts off is the end of this line and nothing else.
+        self.file
+            .write_all(text.as_bytes())
+            .and_then(|()| self.file.flush())
+            .map_err(|error| failed(error.to_string()))?;
+        self.all.push(line);
+        Ok(())
+    }
+}
+
+/// The folder of a study.
+pub struct Folder {
+    /// As it was named.
+    pub path: PathBuf,
+    /// `points.jsonl`.
+    pub points: Lines<Point>,
+    /// `references.jsonl`.
+    references: Lines<ReferenceLine>,
+}
+
+impl Folder {
+    /// Opens or makes it, for this process alone.
+    pub fn open(path: &Path) -> Result<Self, Failure> {
+        for folder in [path.to_owned(), path.join("pictures"), path.join("references")] {
+            fs::create_dir_all(&folder)
+                .map_err(|error| Failure::bad_input(format!("{}: {error}; name a folder", folder.display())))?;
+        }
+        // The points' lock is the folder's.
+        let points = Lines::open(&path.join("points.jsonl"))?;
+        Ok(Self { path: path.to_owned(), points, references: Lines::open(&path.join("references.jsonl"))? })
+    }
+
+    /// Writes a file that other files refer to by this name.
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+        Destination::check(&self.path.join(name))?.write(bytes)
+    }
+
+    /// The reference of a place, if one was kept that this machine rendered with this effort.
+    pub fn reference(&self, open: &OpenPlace, effort: &Effort) -> Option<(ReferenceLine, ReferencePixels)> {
+        let is_same = |line: &&ReferenceLine| {
+            line.place == open.place && line.machine == open.machine && line.effort == effort.of_reference()
+        };
+        let line = self.references.all.iter().rev().find(is_same)?;
+        let bytes = fs::read(self.path.join(&line.pictures[1])).ok()?;
+        let pixels = reference_file::read(&bytes, &of(&line.place, &line.machine, &line.effort))?;
+        Some((line.clone(), pixels))
+    }
+
+    /// Keeps a reference: first its files, then the line that says they are there.
+    pub fn keep_reference(&mut self, reference: &Reference, exposure: f32) -> Result<(), Failure> {
+        let Reference { line, pixels, .. } = reference;
+        let shown = mica_accuracy::displayed(&pixels.whole, exposure);
+        self.write(&line.pictures[0], &crate::picture::png_of(&shown, pixels.size)?)?;
+        let bytes = reference_file::write(pixels, &of(&line.place, &line.machine, &line.effort))?;
+        self.write(&line.pictures[1], &bytes)?;
+        self.references.add(line.clone())
+    }
+}
+
+/// Whose reference a file is.
+fn of(place: &Place, machine: &Machine, effort: &str) -> String {
+    format!("{place:?} {machine:?} {effort}")
+}
+
+/// The names of a reference's picture and .exr.
+pub fn reference_names(place: &Place) -> [String; 2] {
+    let place = place_name(place);
+    [format!("pictures/{place}-reference.png"), format!("references/{place}.exr")]
+}
+
+/// The names of a point's picture and of the map of its FLIP.
+pub fn picture_names(point: &Point) -> [String; 2] {
+    let name = format!("pictures/{}-{}-{}", place_name(&point.place), point.method, file_word(&point.rung));
+    [format!("{name}.png"), format!("{name}-difference.png")]
+}
+
+fn place_name(place: &Place) -> String {
+    let [width, height] = place.size;
+    format!("{}-{}-{width}x{height}", file_word(&place.scene), place.lighting)
+}
+
+/// A text as part of a file's name; where that loses something, a hash keeps texts apart.
+fn file_word(text: &str) -> String {
+    let word: String = text.chars().map(|c| if c.is_ascii_alphanumeric() || c == '.' { c } else { '_' }).collect();
+    let word = word.trim_start_matches('.');
+    if word == text.replace(' ', "_") && word.len() <= 60 {
+        return word.to_owned();
+    }
+    // FNV-1a (Fowler, Noll and Vo).
+    let hash = text.bytes().fold(0x811c_9dc5_u32, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193));
+    // The end of a path says more than its beginning.
+    let end = word.len().saturating_sub(60);
+    format!("{}-{hash:08x}", &word[end..])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    struct Line {
+        number: u32,
+    }
+
+    fn numbers(path: &Path) -> Vec<u32> {
+        Lines::<Line>::open(path).expect("lines").all.iter().map(|line| line.number).collect()
+    }
+
+    #[test]
+    fn a_line_that_was_cut_short_is_taken_off_and_nothing_else() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("lines.jsonl");
+        let mut lines = Lines::open(&path).expect("lines");
+        for number in [1, 2] {
+            lines.add(Line { number }).expect("written");
+        }
+        drop(lines);
+        let whole = fs::read(&path).expect("a file");
+        for cut in 0..whole.len() {
+            fs::write(&path, &whole[..cut]).expect("written");
+            let kept = numbers(&path);
+            assert_eq!(
+                kept,
+                (1..=whole[..cut].iter().filter(|byte| **byte == b'\n').count() as u32).collect::<Vec<_>>()
+            );
+            let mut lines = Lines::open(&path).expect("lines");
+            lines.add(Line { number: 9 }).expect("written");
+            drop(lines);
+            assert_eq!(numbers(&path), [kept, vec![9]].concat());
+        }
+    }
+
+    #[test]
+    fn lines_of_another_kind_stay_and_are_passed_over() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("lines.jsonl");
+        let text = "{\"number\":1}\n\n{\"word\":\"x\"}\n\u{fffd}\n{\"number\":2}\n";
+        fs::write(&path, text).expect("written");
+        assert_eq!(numbers(&path), [1, 2]);
+        assert_eq!(fs::read_to_string(&path).expect("a file"), text);
+    }
+
+    #[test]
+    fn two_processes_do_not_write_one_file() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("lines.jsonl");
+        let first = Lines::<Line>::open(&path).expect("lines");
+        let second = Lines::<Line>::open(&path);
+        assert!(second.is_err_and(|failure| failure.code == 2 && failure.to_string().contains("another mica")));
+        drop(first);
+        assert!(Lines::<Line>::open(&path).is_ok());
+    }
+
+    #[test]
+    fn names_of_files_are_plain_and_differ_where_texts_do() {
+        assert_eq!([file_word("shoe"), file_word("epsilon .1")], ["shoe", "epsilon_.1"]);
+        let texts = ["a/b.glb", "a_b.glb", "../a/b.glb", "\u{e9}", "\u{e8}", "", ".", "repaired, 4 layers"];
+        let words = texts.map(file_word);
+        for (index, word) in words.iter().enumerate() {
+            assert!(word.chars().all(|c| c.is_ascii_alphanumeric() || "._-".contains(c)), "{word}");
+            assert!(!word.starts_with('.'), "{word}");
+            assert!(!words[..index].contains(word), "{word}");
+        }
+        assert!(file_word(&"x".repeat(4000)).len() < 80);
+    }
+}

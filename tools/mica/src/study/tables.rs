@@ -1,0 +1,68 @@
+//! What was found at a place, for people.
+
+use crate::table::{Column, bytes, table};
+use mica_accuracy::{Estimate, Point};
+
+/// A heading and a row for each point.
+pub fn of_place(points: &[Point]) -> String {
+    let Some(first) = points.first() else { return String::new() };
+    let [width, height] = first.place.size;
+    let lighting = match first.place.lighting.as_str() {
+        "own" => "",
+        "lights" => ", without its environment",
+        _ => ", without its lights",
+    };
+    let clock = if first.cost.clock == "cpu" { "processor time" } else { "GPU time" };
+    let mut text = format!("\n{} {width}x{height}{lighting}; {clock} on {}\n", first.place.scene, first.machine.device);
+    let with_errors = points.iter().any(|point| point.errors.is_some());
+    let mut columns = vec![Column::Left("method"), Column::Left("rung")];
+    if with_errors {
+        columns.extend(["W1", "mean ratio", "FLIP"].map(Column::Right));
+    }
+    columns.extend(["glints ms", "with/without", "frame ms", "tables ms", "glint memory"].map(Column::Right));
+    let rows: Vec<Vec<String>> = points
+        .iter()
+        .map(|point| {
+            let mut row = vec![point.method.clone(), point.rung.clone()];
+            if with_errors {
+                let errors = point.errors.as_ref();
+                let figure = |of: Option<Estimate>| of.map_or_else(|| "-".to_owned(), |of| with_spread(of, 1.0, 3));
+                row.push(figure(errors.map(|errors| errors.w1)));
+                row.push(figure(errors.map(|errors| errors.mean_ratio)));
+                row.push(figure(errors.map(|errors| errors.flip)));
+            }
+            let cost = &point.cost;
+            row.push(with_spread(cost.glints, 1e-6, 2));
+            row.push(with_spread(cost.ratio, 1.0, 3));
+            row.push(with_spread(cost.frame, 1e-6, 1));
+            row.push(format!("{:.1}", (cost.tables + cost.precomputation) * 1e-6));
+            row.push(bytes(cost.glint_bytes));
+            row
+        })
+        .collect();
+    text += &table(&columns, &rows);
+    text
+}
+
+/// A figure with half the width of its spread; a dash for what is not defined.
+fn with_spread(Estimate { value, low, high }: Estimate, factor: f64, places: usize) -> String {
+    if !value.is_finite() {
+        return "-".to_owned();
+    }
+    let half = (high - value).max(value - low) * factor;
+    let spread = if half.is_finite() { format!(" ± {half:.places$}") } else { String::new() };
+    format!("{:.places$}{spread}", value * factor)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_stand_with_the_farther_end_of_their_spread() {
+        let estimate = Estimate { value: 2e6, low: 1.5e6, high: 2.1e6 };
+        assert_eq!(with_spread(estimate, 1e-6, 2), "2.00 ± 0.50");
+        assert_eq!(with_spread(Estimate::UNKNOWN, 1.0, 2), "-");
+        assert_eq!(with_spread(Estimate { value: 1.0, ..Estimate::UNKNOWN }, 1.0, 1), "1.0");
+    }
+}
