@@ -9,6 +9,7 @@ mod contact_shadows;
 mod deliot_belcour;
 mod displayed;
 mod exactness;
+mod exactness_scenes;
 mod flake_queries;
 mod flakes;
 mod foreign_models;

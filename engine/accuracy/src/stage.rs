@@ -9,7 +9,7 @@ use glam::{DAffine3, DVec3};
 use mica_gpu::{Error, Executor, Timing};
 use mica_graph::Graph;
 use mica_render::scene::{Camera, Glint, Instance, Light, Material, Mesh, Scene};
-use mica_render::{OcclusionBackend, RenderError, Renderer, SettingError, View};
+use mica_render::{Environment, Frame, OcclusionBackend, RenderError, Renderer, SettingError, View};
 
 /// Metres, and units of texture, that a pixel covers where it is seen from above.
 const PIXEL: f64 = 1.0 / 256.0;
@@ -70,6 +70,18 @@ pub struct Stage {
 impl Stage {
     /// The stage for the angles of `condition`, without environment, shadows or occlusion; flakes reflect everything.
     pub fn new(method: &str, condition: &Condition) -> Result<Self, RenderError> {
+        let light = Light::Directional { direction: -world(condition.i()), irradiance: [1.0; 3] };
+        Self::lit(method, condition, &[light], None)
+    }
+
+    /// The same under other lights, and an environment: pixels differ in what flakes mirror. Of the angles only the view's
+    /// matters, which is towards +Z of the world.
+    pub fn lit(
+        method: &str,
+        condition: &Condition,
+        lights: &[Light],
+        environment: Option<&Environment>,
+    ) -> Result<Self, RenderError> {
         let corners = [[-HALF, -HALF], [-HALF, HALF], [HALF, HALF], [HALF, -HALF]];
         let mesh = Mesh {
             name: "stage".to_owned(),
@@ -94,8 +106,7 @@ impl Stage {
             materials: vec![material],
             ..Scene::default()
         };
-        let light = Light::Directional { direction: -world(condition.i()), irradiance: [1.0; 3] };
-        let renderer = Renderer::new(scene, &[light], None, OcclusionBackend::None)?;
+        let renderer = Renderer::new(scene, lights, environment, OcclusionBackend::None)?;
         Ok(Self { renderer, view: *condition })
     }
 
@@ -121,6 +132,26 @@ impl Stage {
         side: u32,
         seed: u32,
     ) -> Result<Vec<f64>, StageError> {
+        let mut graph = Graph::new();
+        let frame = self.frame(&mut graph, condition, [side, seed], true)?;
+        let download = graph.download_image(&frame.radiance);
+        let mut run = executor.run(graph, Timing::Overlapped)?;
+        let pixels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&run.take(download));
+        let cos_i = condition.i().z;
+        Ok(pixels.into_iter().map(|pixel| f64::from(pixel[1]) / cos_i).collect())
+    }
+
+    /// Declares a frame of `side` x `side` pixels that show flakes of a `seed`, with the method's glints or without.
+    ///
+    /// # Panics
+    /// As [`Stage::samples`].
+    pub fn frame(
+        &mut self,
+        graph: &mut Graph,
+        condition: &Condition,
+        [side, seed]: [u32; 2],
+        glints: bool,
+    ) -> Result<Frame, StageError> {
         let angles = |of: &Condition| (of.theta_i_deg, of.theta_o_deg, of.phi_deg);
         assert_eq!(angles(condition), angles(&self.view), "a stage is made for certain angles");
         for (key, value) in [
@@ -135,14 +166,8 @@ impl Stage {
         let target = DVec3::new(0.4031, 0.0, 0.3527);
         let eye = target + DISTANCE * world(condition.o());
         let fov = 2.0 * (0.5 * f64::from(side) * PIXEL / DISTANCE).atan();
-        let view = View::new(Camera::looking_at("stage", eye, target, fov, 1.0), [side, side]);
-        let mut graph = Graph::new();
-        let frame = self.renderer.frame(&mut graph, &view, None)?;
-        let download = graph.download_image(&frame.radiance);
-        let mut run = executor.run(graph, Timing::Overlapped)?;
-        let pixels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&run.take(download));
-        let cos_i = condition.i().z;
-        Ok(pixels.into_iter().map(|pixel| f64::from(pixel[1]) / cos_i).collect())
+        let camera = Camera::looking_at("stage", eye, target, fov, 1.0);
+        Ok(self.renderer.frame(graph, &View { glints, ..View::new(camera, [side, side]) }, None)?)
     }
 }
 

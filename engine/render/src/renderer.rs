@@ -42,6 +42,20 @@ pub struct Frame {
     pub ids: Image,
     /// Derivatives of the flakes' texture coordinates over the pixel: du/dx, dv/dx, du/dy, dv/dy.
     pub footprint: Image,
+    /// Where each pixel's surface is, in scene space, and the first of two octahedral numbers of its triangle's normal.
+    pub position: Image,
+    /// Its shading normal, on the viewer's side, and the second of them.
+    pub normal: Image,
+    /// The flakes' texture coordinates, then the clear coat's weight and roughness.
+    pub uv: Image,
+    /// Reflectance at normal incidence, and the weight of the smooth lobe.
+    pub specular: Image,
+    /// The camera and the environment's rotation: [`mica_shaders::types::Frame`].
+    pub constants: Buffer,
+    /// One bit for each light that does not reach it; none where nothing casts shadows.
+    pub shadow_mask: Option<Image>,
+    /// How free the mirror direction of each glinting pixel is, as it dims each layer of glints whose method asks for it.
+    pub visibility: Vec<Image>,
     /// The passes, by index in the graph, that bring tables up to date rather than draw.
     pub updates: std::ops::Range<usize>,
     /// The passes that trace rays, each with how many; a name may occur more than once.
@@ -321,25 +335,44 @@ impl Renderer {
                 })
             }
         };
-        // Without lights no shader reads it.
-        let shadow_mask = shadow_mask.as_ref().unwrap_or(&self.no_lights);
         g.because("every frame");
-        let base = passes::base::base(g, &self.buffers, &self.environment, &frame, &gbuffer, shadow_mask);
+        // Without lights no shader reads it.
+        let mask = shadow_mask.as_ref().unwrap_or(&self.no_lights);
+        let base = passes::base::base(g, &self.buffers, &self.environment, &frame, &gbuffer, mask);
         let environment = self.environment.map();
-        let shading = Shading { scene: &self.buffers, frame: &frame, gbuffer: &gbuffer, shadow_mask, environment };
+        let shading =
+            Shading { scene: &self.buffers, frame: &frame, gbuffer: &gbuffer, shadow_mask: mask, environment };
         let mut radiance = base;
+        let mut visibilities = Vec::new();
         for (finish, materials) in &layers {
             let layer = self.specular_layer(g, materials, &shading, *finish);
             let visibility = self.mirror_visibility(g, &shading, *finish, &mut rays);
             g.because("what the flakes reflect is added to the rest");
             radiance = passes::composite::composite(g, &frame, &gbuffer, &radiance, &layer, visibility.as_ref());
+            visibilities.extend(visibility);
         }
         self.explain_absent(view.glints, &glinting, mirror_occlusion, &mut left_out);
         let radiance = self.accumulate(g, &frame, radiance, earlier);
         g.because("every frame");
         let display = passes::tonemap::tonemap(g, &frame, &radiance, view.exposure);
-        let (ids, footprint) = (gbuffer.ids, gbuffer.footprint);
-        Ok(Frame { radiance, display, ids, footprint, updates, rays, left_out })
+        let passes::GBuffer { ids, footprint, position, normal, uv, specular, .. } = gbuffer;
+        let visibility = visibilities;
+        Ok(Frame {
+            radiance,
+            display,
+            ids,
+            footprint,
+            position,
+            normal,
+            uv,
+            specular,
+            constants: frame,
+            shadow_mask,
+            visibility,
+            updates,
+            rays,
+            left_out,
+        })
     }
 
     /// Declares rays of the caller's own: each of the first `count` in `rays`, [`Ray`](crate::Ray)s in scene space, gets a

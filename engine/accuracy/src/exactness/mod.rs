@@ -6,14 +6,21 @@
 
 mod arithmetic;
 mod count_law;
+pub mod environment;
+pub mod extract;
+pub mod footprint;
 mod kernel;
 mod lit_probability;
+pub mod moments;
+pub mod occlusion;
+mod resample;
 
-use crate::{Estimate, Machine};
+use crate::{Estimate, Machine, StageError};
 use kernel::Rung;
 use mica_gpu::{DeviceKind, Error, Executor, Run, Timing};
 use mica_oracle::OracleError;
-use mica_render::Progress;
+use mica_render::scene::SceneError;
+use mica_render::{Progress, RenderError, SettingError};
 use serde::{Deserialize, Serialize};
 
 /// What lines of exactness say of themselves.
@@ -26,19 +33,29 @@ pub enum Chart {
     LitProbability,
     /// How many of the flakes in a footprint are lit.
     CountLaw,
+    /// Which flakes a pixel sums over.
+    Footprint,
+    /// What flakes reflect of light from everywhere.
+    Environment,
+    /// What hides light from flakes.
+    Occlusion,
     /// One formula, written naively and stably.
     Arithmetic,
 }
 
 impl Chart {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::LitProbability, Self::CountLaw, Self::Arithmetic];
+    pub const ALL: [Self; 6] =
+        [Self::LitProbability, Self::CountLaw, Self::Footprint, Self::Environment, Self::Occlusion, Self::Arithmetic];
 
     /// Its name in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::LitProbability => "lit_probability",
             Self::CountLaw => "count_law",
+            Self::Footprint => "footprint",
+            Self::Environment => "environment",
+            Self::Occlusion => "occlusion",
             Self::Arithmetic => "arithmetic",
         }
     }
@@ -93,6 +110,16 @@ impl Effort {
     pub const QUICK: Self = Self { rounds: 7, round_ns: 3e6 };
     /// Under a minute.
     pub const FULL: Self = Self { rounds: 25, round_ns: 1e7 };
+
+    /// What whole frames are asked, over what they are asked at the least effort.
+    fn frames(&self) -> u32 {
+        if self.rounds > 1 { 2 } else { 1 }
+    }
+
+    /// Rounds of whole frames, which take longer than a pass.
+    fn frame_rounds(&self) -> usize {
+        self.rounds.min(7)
+    }
 }
 
 /// Why nothing was measured.
@@ -104,6 +131,18 @@ pub enum ExactnessError {
     /// The truth cannot be computed.
     #[error(transparent)]
     Oracle(#[from] OracleError),
+    /// A frame cannot be declared.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// The stage does not show what it should.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    /// A setting is out of its range.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// An embedded scene is broken.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// The device says nothing of time.
     #[error("{device} tells no times, neither of its own nor of the processor; nothing can be said of costs")]
     NoClock {
@@ -126,6 +165,9 @@ pub fn measure(
     match chart {
         Chart::LitProbability => lit_probability::measure(executor, effort, machine, progress),
         Chart::CountLaw => count_law::measure(executor, effort, machine, progress),
+        Chart::Footprint => footprint::measure(executor, effort, machine, progress),
+        Chart::Environment => environment::measure(executor, effort, machine, progress),
+        Chart::Occlusion => occlusion::measure(executor, effort, machine, progress),
         Chart::Arithmetic => arithmetic::measure(executor, effort, machine, progress),
     }
 }
@@ -218,6 +260,16 @@ pub fn in_turn<E>(
         }
     }
     Ok(values)
+}
+
+/// Nanoseconds that the passes of a name took in a frame that was run with isolated timing.
+///
+/// # Errors
+/// If there are none, or the device says nothing of time.
+pub fn pass_ns(executor: &Executor, run: &Run, name: &str) -> Result<f64, ExactnessError> {
+    let mut of_name = run.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.ns).peekable();
+    let ns: Option<u64> = of_name.peek().is_some().then(|| of_name.sum()).flatten();
+    ns.map(|ns| ns as f64).ok_or_else(|| ExactnessError::NoClock { device: executor.device().info().name.clone() })
 }
 
 /// Median, least and greatest.

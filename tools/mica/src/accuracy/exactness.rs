@@ -8,6 +8,7 @@ use crate::progress::Progress;
 use crate::session::{cache, executor};
 use crate::study::{Lines, machine};
 use crate::table::{Column, table};
+use mica_accuracy::Machine;
 use mica_accuracy::exactness::{Chart, Effort, ExactnessError, ExactnessLine, measure};
 use mica_gpu::{Device, DeviceOptions};
 use std::path::Path;
@@ -31,7 +32,9 @@ pub fn exactness(
     let effort = if args.quick { Effort::QUICK } else { Effort::FULL };
     let is_there = |chart: Chart| {
         let all = lines.iter().flat_map(|lines| &lines.all);
-        all.filter(|line| line.machine == machine).any(|line| line.chart == chart.name())
+        // Some charts ask about occlusion, and say who answered.
+        let same = |of: &Machine| Machine { occlusion: machine.occlusion.clone(), ..of.clone() } == machine;
+        all.filter(|line| same(&line.machine)).any(|line| line.chart == chart.name())
     };
     let wanted: Vec<Chart> = Chart::ALL.into_iter().filter(|chart| anew || !is_there(*chart)).collect();
     interrupt.defer();
@@ -66,6 +69,10 @@ impl From<ExactnessError> for Failure {
     fn from(error: ExactnessError) -> Self {
         match error {
             ExactnessError::Gpu(error) => error.into(),
+            ExactnessError::Render(error) => error.into(),
+            ExactnessError::Stage(error) => error.into(),
+            ExactnessError::Setting(error) => error.into(),
+            ExactnessError::Scene(error) => Self::bad_input(error.to_string()),
             ExactnessError::Oracle(error) => Self::bad_input(error.to_string()),
             error @ ExactnessError::NoClock { .. } => Self::with_code(3, error.to_string()),
         }
