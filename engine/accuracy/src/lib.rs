@@ -5,6 +5,7 @@ mod counts;
 mod errors;
 pub mod exactness;
 mod flip;
+mod front;
 mod luminance;
 mod path;
 mod point;
@@ -17,6 +18,7 @@ mod tiles;
 pub use counts::{CountErrors, CountLaw};
 pub use errors::{ErrorsError, Pixels, Radiance, Reference};
 pub use flip::{ErrorMap, displayed};
+pub use front::front;
 pub use luminance::luminance;
 pub use point::{
     BandErrors, Bytes, Cost, Errors, Estimate, Machine, Metric, POINT_SCHEMA, PathErrors, Place, Point,

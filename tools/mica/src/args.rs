@@ -281,6 +281,9 @@ pub struct AccuracyArgs {
     /// A contact sheet of all methods on all embedded scenes but the large one.
     #[arg(long, value_name = "FILE.png")]
     pub sheet: Option<PathBuf>,
+    /// Draws the report of a study anew from what is in its folder (-o), and measures nothing.
+    #[arg(long, requires = "output", conflicts_with_all = ["counts", "sheet", "exactness"])]
+    pub redraw: bool,
     /// A method to look at (repeatable). Default: all.
     #[arg(long, value_name = "NAME")]
     pub method: Vec<String>,

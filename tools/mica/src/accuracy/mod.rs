@@ -9,10 +9,16 @@ use crate::error::Failure;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::study;
+use crate::{output, page};
 use mica_render::{METHODS, MethodInfo, method};
 
 /// Does what was asked for.
 pub fn accuracy(args: &AccuracyArgs) -> Result<(), Failure> {
+    if let (true, Some(folder)) = (args.redraw, &args.output) {
+        let written = page::write(folder)?;
+        let paths: Vec<String> = written.iter().map(|path| format!("{}\n", path.display())).collect();
+        return if args.quiet { Ok(()) } else { output::print(&paths.concat()) };
+    }
     let is_study = !args.counts && !args.exactness && args.sheet.is_none();
     if is_study && args.output.is_none() {
         return Err(Failure::bad_input(

@@ -7,6 +7,7 @@ mod mistakes;
 mod occlusion;
 mod oracle;
 mod render;
+mod report;
 
 use serde_json::Value as Json;
 use std::path::{Path, PathBuf};

@@ -1,0 +1,151 @@
+//! Logarithmic axes: how far they reach, and where their ticks are.
+
+use super::three_digits;
+
+/// An axis from one value to another, over a stretch of pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axis {
+    range: [f64; 2],
+    pixels: [f64; 2],
+}
+
+/// A line across the chart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tick {
+    /// Where.
+    pub at: f64,
+    /// What stands beside it; none for lines in between.
+    pub label: Option<String>,
+}
+
+/// An axis has ticks for this much at least, so that one point alone has an axis too.
+const LEAST_RATIO: f64 = 3.0;
+/// Space beyond the outermost values.
+const MARGIN: f64 = 1.3;
+
+impl Axis {
+    /// An axis on which all values that are finite and positive lie.
+    pub fn around(values: impl Iterator<Item = f64>, pixels: [f64; 2]) -> Option<Self> {
+        let usable = values.filter(|value| value.is_finite() && *value > 1e-30 && *value < 1e30);
+        let (least, greatest) =
+            usable.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
+        if greatest == 0.0 {
+            return None;
+        }
+        let (mut low, mut high) = (least / MARGIN, greatest * MARGIN);
+        if high / low < LEAST_RATIO {
+            let wider = (LEAST_RATIO / (high / low)).sqrt();
+            (low, high) = (low / wider, high * wider);
+        }
+        Some(Self { range: [low, high], pixels })
+    }
+
+    /// Where a value lies, also beyond the ends; what is not positive lies at the lower end.
+    pub fn at(&self, value: f64) -> f64 {
+        let [low, high] = self.range;
+        let share = if value > 0.0 { (value / low).ln() / (high / low).ln() } else { 0.0 };
+        self.pixels[0] + share * (self.pixels[1] - self.pixels[0])
+    }
+
+    /// The same, at the nearer end if it is beyond.
+    pub fn within(&self, value: f64) -> f64 {
+        self.at(value.clamp(self.range[0], self.range[1]))
+    }
+
+    /// Whether a value lies between the ends.
+    pub fn holds(&self, value: f64) -> bool {
+        (self.range[0]..=self.range[1]).contains(&value)
+    }
+
+    /// A line for every whole multiple of a power of ten, and labels on so many of them as can be read.
+    pub fn ticks(&self) -> Vec<Tick> {
+        let [low, high] = self.range;
+        let decades = low.log10().floor() as i32..=high.log10().floor() as i32;
+        // Over many decades, the decades alone.
+        let multiples: &[u32] = if (high / low).log10() > 7.0 { &[1] } else { &[1, 2, 3, 4, 5, 6, 7, 8, 9] };
+        let all: Vec<(u32, f64)> = decades
+            .flat_map(|decade| multiples.iter().map(move |multiple| (*multiple, decimal(*multiple, decade))))
+            .filter(|(_, value)| self.holds(*value))
+            .collect();
+        let labelled: &[u32] = [&[1][..], &[1, 3], &[1, 2, 5], &[1, 2, 3, 5, 7], multiples]
+            .into_iter()
+            .find(|labelled| all.iter().filter(|(multiple, _)| labelled.contains(multiple)).count() >= 3)
+            .unwrap_or(multiples);
+        let stride = all.iter().filter(|(multiple, _)| *multiple == 1).count().div_ceil(8).max(1);
+        let mut decade = 0;
+        all.iter()
+            .map(|(multiple, value)| {
+                decade += usize::from(*multiple == 1);
+                let shown = labelled.contains(multiple) && (labelled.len() > 1 || decade % stride == 0 || stride == 1);
+                Tick { at: self.at(*value), label: shown.then(|| label(*value)) }
+            })
+            .collect()
+    }
+}
+
+/// A multiple of a power of ten, as the decimal says it: products of powers would be an ulp off.
+fn decimal(multiple: u32, exponent: i32) -> f64 {
+    format!("{multiple}e{exponent}").parse().unwrap_or(f64::NAN)
+}
+
+fn label(value: f64) -> String {
+    if (1e-3..1e6).contains(&value) {
+        return three_digits(value);
+    }
+    let exponent = (value.log10() + 1e-9).floor() as i32;
+    let multiple = (value / 10_f64.powi(exponent)).round();
+    let power: String = exponent.to_string().chars().map(superscript).collect();
+    if multiple == 1.0 { format!("10{power}") } else { format!("{multiple}·10{power}") }
+}
+
+const fn superscript(digit: char) -> char {
+    match digit {
+        '-' => '⁻',
+        '0' => '⁰',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        '4' => '⁴',
+        '5' => '⁵',
+        '6' => '⁶',
+        '7' => '⁷',
+        '8' => '⁸',
+        _ => '⁹',
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(values: &[f64]) -> Vec<String> {
+        let axis = Axis::around(values.iter().copied(), [0.0, 100.0]).expect("an axis");
+        axis.ticks().into_iter().filter_map(|tick| tick.label).collect()
+    }
+
+    #[test]
+    fn labels_are_round_numbers_within_the_axis_and_enough_of_them() {
+        assert_eq!(labels(&[3.0, 9000.0]), ["10", "100", "1000", "10,000"]);
+        assert_eq!(labels(&[0.02, 0.4]), ["0.03", "0.1", "0.3"]);
+        assert_eq!(labels(&[5.0]), ["3", "5", "7"]);
+        assert_eq!(labels(&[2e-9, 3e-7]), ["3·10⁻⁹", "10⁻⁸", "3·10⁻⁸", "10⁻⁷", "3·10⁻⁷"]);
+        for (low, high) in [(1e-12, 1e12), (1.0, 1.0001), (0.9, 1.1), (7.7, 8.8), (1e-29, 1e29)] {
+            let found = labels(&[low, high]);
+            assert!((3..=10).contains(&found.len()), "{low} to {high}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn values_lie_where_their_logarithm_says() {
+        let axis = Axis::around([1.0, 100.0].into_iter(), [10.0, 210.0]).expect("an axis");
+        assert!((axis.at(10.0) - 110.0).abs() < 1e-9);
+        assert_eq!((axis.within(1e9), axis.within(-1.0), axis.within(0.0)), (210.0, 10.0, 10.0));
+        let tick = axis.ticks().into_iter().find(|tick| tick.label.as_deref() == Some("10")).expect("a tick");
+        assert!((tick.at - 110.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_makes_no_axis() {
+        assert_eq!(Axis::around([0.0, -1.0, f64::NAN, f64::INFINITY, 1e300].into_iter(), [0.0, 1.0]), None);
+    }
+}
