@@ -106,6 +106,12 @@ impl Declared {
 impl Session {
     /// Loads the scene, finds a device, and applies all settings. No frame is made yet.
     pub fn new(args: &SceneArgs, progress: &mut Progress) -> Result<Self, Failure> {
+        Self::on(None, args, progress)
+    }
+
+    /// The same on the device of an earlier session, whose pipelines are there already: which device, how much memory and
+    /// which cache were decided then.
+    pub fn on(earlier: Option<Executor>, args: &SceneArgs, progress: &mut Progress) -> Result<Self, Failure> {
         if let Some(name) = &args.method {
             method(name)?;
         }
@@ -121,7 +127,10 @@ impl Session {
         let exposure = args.exposure.exp2() as f32;
         let view = View { exposure, ..View::new(camera, args.size) };
 
-        let device = Device::new(&DeviceOptions { select: args.device.clone(), validation: args.validation })?;
+        let device = match &earlier {
+            Some(executor) => executor.device().clone(),
+            None => Device::new(&DeviceOptions { select: args.device.clone(), validation: args.validation })?,
+        };
         check_size(args.size, device.info())?;
         let triangles = chosen.scene.meshes.iter().map(|mesh| mesh.triangle_count() as u64).sum();
         let occlusion = occlusion_choice::choose(args.occlusion, device.info(), triangles)?;
@@ -142,7 +151,10 @@ impl Session {
         }
 
         let cache = cache(args.cache.as_deref(), args.no_cache);
-        let executor = executor(device, cache.as_ref(), args.memory)?;
+        let executor = match earlier {
+            Some(executor) => executor,
+            None => executor(device, cache.as_ref(), args.memory)?,
+        };
         Ok(Self {
             scene: name,
             environment: environment.name,
@@ -159,6 +171,11 @@ impl Session {
     /// The device.
     pub fn device(&self) -> &DeviceInfo {
         self.executor.device().info()
+    }
+
+    /// What runs frames, for another session.
+    pub fn into_executor(self) -> Executor {
+        self.executor
     }
 
     /// The names of the methods in use, or of the one that would be.

@@ -8,16 +8,15 @@ use crate::args::AccuracyArgs;
 use crate::error::Failure;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
-use crate::study;
+use crate::study::{self, Folder};
 use crate::{output, page};
 use mica_render::{METHODS, MethodInfo, method};
+use std::path::Path;
 
 /// Does what was asked for.
 pub fn accuracy(args: &AccuracyArgs) -> Result<(), Failure> {
     if let (true, Some(folder)) = (args.redraw, &args.output) {
-        let written = page::write(folder)?;
-        let paths: Vec<String> = written.iter().map(|path| format!("{}\n", path.display())).collect();
-        return if args.quiet { Ok(()) } else { output::print(&paths.concat()) };
+        return draw(args, folder);
     }
     let is_study = !args.counts && !args.exactness && args.sheet.is_none();
     if is_study && args.output.is_none() {
@@ -29,7 +28,12 @@ pub fn accuracy(args: &AccuracyArgs) -> Result<(), Failure> {
     let interrupt = Interrupt::new()?;
     let mut progress = Progress::new(args.quiet);
     if let Some(folder) = args.output.as_deref().filter(|_| is_study) {
-        return study::study(args, folder, &methods, &interrupt, &mut progress);
+        let mut folder = Folder::open(folder)?;
+        let points = study::study(args, &mut folder, &methods, &interrupt, &mut progress);
+        let charts = points.as_ref().map_or(Ok(()), |()| exactness::exactness(args, false, &interrupt, &mut progress));
+        // What was measured is shown, whatever became of the rest.
+        let drawn = if folder.points.all.is_empty() { Ok(()) } else { draw(args, &folder.path) };
+        return points.and(charts).and(drawn);
     }
     // A file that cannot be written is known before anything is computed.
     let sheet = args.sheet.as_deref().map(|path| sheet::Sheet::check(path, &args.size)).transpose()?;
@@ -43,6 +47,13 @@ pub fn accuracy(args: &AccuracyArgs) -> Result<(), Failure> {
         sheet.draw(args, &methods, &interrupt, &mut progress)?;
     }
     Ok(())
+}
+
+/// The report of a study.
+fn draw(args: &AccuracyArgs, folder: &Path) -> Result<(), Failure> {
+    let written = page::write(folder)?;
+    let Some((page, plots)) = written.split_first().filter(|_| !args.quiet) else { return Ok(()) };
+    output::print(&format!("{}, and {} files in plots/\n", page.display(), plots.len()))
 }
 
 /// The methods of these names, or all.

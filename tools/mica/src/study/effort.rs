@@ -21,7 +21,7 @@ pub struct Effort {
 impl Effort {
     /// For minutes.
     pub fn quick() -> Self {
-        Self { parts: [4, 5], path_frames: 4, path_parts: 2, seconds: 1.5, rounds: [2, 6], isolated: 1 }
+        Self { parts: [4, 5], path_frames: 3, path_parts: 2, seconds: 0.8, rounds: [3, 5], isolated: 1 }
     }
 
     /// For hours.

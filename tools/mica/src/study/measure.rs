@@ -2,9 +2,9 @@
 
 use super::effort::Effort;
 use super::place::OpenPlace;
-use super::reference::{Reference, path_frames};
-use super::timing::paired;
-use crate::error::{Failure, INTERRUPTED};
+use super::reference::path_frames;
+use super::{Reference, paired};
+use crate::error::Failure;
 use crate::interrupt::Interrupt;
 use crate::picture::png_of;
 use mica_accuracy::{ErrorMap, POINT_SCHEMA, Point, displayed};
@@ -39,10 +39,7 @@ pub fn measure(
     let view = open.session.view.clone();
     let picture = open.radiance(&view)?;
     let mut errors = pixels.errors(&picture, base, view.exposure)?;
-    if interrupt.requested() {
-        return Err(Failure::with_code(INTERRUPTED, "interrupted"));
-    }
-    errors.path = pixels.path_errors(&path_frames(open, path)?)?;
+    errors.path = pixels.path_errors(&path_frames(open, &picture, path, interrupt)?)?;
     point.errors = Some(errors);
 
     let size = view.size;

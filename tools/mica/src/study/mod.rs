@@ -14,11 +14,11 @@ mod tables;
 mod timing;
 
 pub use effort::Effort;
-pub use measure::{Measured, measure, unmeasured};
+pub use measure::{measure, unmeasured};
 pub use place::{Lighting, OpenPlace, machine};
 pub use plan::{Stop, rungs, stops};
 pub use reference::{Reference, ReferencePixels};
 pub use run::study;
 pub use store::{Folder, Lines};
 pub use tables::of_place as table_of;
-pub use timing::{Clock, paired};
+pub use timing::paired;

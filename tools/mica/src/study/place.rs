@@ -5,7 +5,7 @@ use crate::error::Failure;
 use crate::progress::Progress;
 use crate::session::{Session, Wanted};
 use mica_accuracy::{Machine, Place};
-use mica_gpu::{DeviceInfo, Timing};
+use mica_gpu::{DeviceInfo, Executor, Timing};
 use mica_render::{COMMON_SETTINGS, GlintMaterial, MethodInfo};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -71,9 +71,19 @@ pub struct OpenPlace {
 impl OpenPlace {
     /// Loads the scene and renders it once without glints, so that what that frame needs is known and there.
     pub fn open(args: &SceneArgs, lighting: Lighting, progress: &mut Progress) -> Result<Self, Failure> {
+        Self::open_on(None, args, lighting, progress)
+    }
+
+    /// The same on the device of an earlier place, so that no shader is compiled twice.
+    pub fn open_on(
+        earlier: Option<Executor>,
+        args: &SceneArgs,
+        lighting: Lighting,
+        progress: &mut Progress,
+    ) -> Result<Self, Failure> {
         let mut args = args.clone();
         lighting.apply(&mut args);
-        let session = Session::new(&args, progress)?;
+        let session = Session::on(earlier, &args, progress)?;
         if lighting == Lighting::Lights && session.renderer.scene().lights.is_empty() {
             let scene = &session.scene;
             return Err(Failure::bad_input(format!("{scene} has no lights; leave out --lighting lights for it")));

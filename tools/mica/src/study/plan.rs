@@ -4,11 +4,16 @@ use super::place::Lighting;
 use mica_render::{EMBEDDED_SCENES, MethodInfo, Rung};
 use std::path::PathBuf;
 
-/// Scenes of a quick study: one of dense flakes under a lamp and soft boxes, one on which every scale is seen at once.
-pub const QUICK_SCENES: [&str; 2] = ["shoe", "plane"];
+/// Scenes of a quick study: many flakes of little roughness and wide cones, and few of the opposite.
+const QUICK_SCENES: [&str; 2] = ["shoe", "cloth"];
 
-/// Rungs that a quick study goes without, as one frame of them takes seconds on a processor.
-const SLOW: [(&str, &[&str]); 1] = [("jakob", &["epsilon .5", "epsilon .1", "epsilon .02", "epsilon 0"])];
+/// Rungs that a quick study goes without, as their frames or tables take seconds on a processor.
+const SLOW: [(&str, &[&str]); 4] = [
+    ("jakob", &["epsilon .5", "epsilon .02", "epsilon 0"]),
+    ("atanasov", &["100 enumerated"]),
+    ("wang2018", &["depth 8"]),
+    ("wang2020", &["samples 1024"]),
+];
 
 /// A place to be opened.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,9 +10,10 @@ use crate::progress::Progress;
 use mica_accuracy::{Errors, MeanOfTwo, PathErrors, Pixels, REFERENCE_SCHEMA, Radiance, ReferenceLine};
 use mica_render::{View, method};
 
-/// The method of references, and what keeps it from falling back to what is expected of many flakes.
+/// The method of references.
 const METHOD: &str = "flakes";
-const EVERY_FLAKE: [(&str, &str); 1] = [("most", "1e6")];
+/// Most flakes of a footprint that it looks at one by one: more show what is expected of them.
+const MOST: f64 = 1e6;
 
 /// A reference, and all that a comparison with it needs.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,7 +74,7 @@ impl Reference {
         interrupt: &Interrupt,
         progress: &mut Progress,
     ) -> Result<Self, Failure> {
-        open.set(method(METHOD)?, &EVERY_FLAKE)?;
+        open.set(method(METHOD)?, &[])?;
         open.session.precompute_anew()?;
         let view = open.session.view.clone();
         let (base, surface) = open.radiance_and_surface(&View { glints: false, ..view.clone() })?;
@@ -113,10 +114,11 @@ impl Reference {
 
         // What a method could be that is right but has flakes of its own.
         open.other_flakes()?;
+        look_at_all(open, &pixels.flakes, &pixels.glinting)?;
         let own = open.radiance(&view)?;
         let views = bases(open, views)?;
         let mut floor = pixels.errors(&own, &base, view.exposure)?;
-        floor.path = pixels.path_errors(&path_frames(open, &views)?)?;
+        floor.path = pixels.path_errors(&path_frames(open, &own, &views, interrupt)?)?;
         let line = ReferenceLine {
             schema: REFERENCE_SCHEMA.to_owned(),
             place: open.place.clone(),
@@ -172,9 +174,23 @@ impl ReferencePixels {
     }
 }
 
-/// The frames of a path as the place stands: luminance of the glints.
-pub fn path_frames(open: &mut OpenPlace, path: &[PathView]) -> Result<Vec<Vec<f32>>, Failure> {
-    path.iter().map(|PathView { view, base }| Ok(luminances(&difference(&open.radiance(view)?, base)))).collect()
+/// The frames of a path as the place stands: luminance of the glints. `first` is the place's own picture, as is the first
+/// of the path.
+pub fn path_frames(
+    open: &mut OpenPlace,
+    first: &[Rgb],
+    path: &[PathView],
+    interrupt: &Interrupt,
+) -> Result<Vec<Vec<f32>>, Failure> {
+    let mut frames = Vec::new();
+    for (index, PathView { view, base }) in path.iter().enumerate() {
+        if interrupt.requested() {
+            return Err(Failure::with_code(INTERRUPTED, "interrupted"));
+        }
+        let glints = if index == 0 { difference(first, base) } else { difference(&open.radiance(view)?, base) };
+        frames.push(luminances(&glints));
+    }
+    Ok(frames)
 }
 
 /// The views with what each shows without glints.
@@ -198,14 +214,25 @@ fn parts(
     for (row, column) in (0..parts).flat_map(|row| (0..parts).map(move |column| (row, column))) {
         shown()?;
         let part = view.part(parts, column, row);
-        let (with, surface) = open.radiance_and_surface(&part)?;
-        let without = open.radiance(&View { glints: false, ..part })?;
+        let (without, surface) = open.radiance_and_surface(&View { glints: false, ..part.clone() })?;
         for (glinting, of_part) in glinting.iter_mut().zip(open.glinting(&surface)) {
             *glinting &= of_part;
         }
+        let flakes = open.flakes(&surface);
+        look_at_all(open, &flakes, glinting)?;
+        let with = open.radiance(&part)?;
         sum.add(&with, &without);
     }
     Ok(sum)
+}
+
+/// Lets the method look at every flake of the pixels that count. It takes a pass over the picture for each 2,000 flakes that
+/// a footprint may hold, and reckons with square footprints: long ones of as many flakes take more steps.
+fn look_at_all(open: &mut OpenPlace, flakes: &[f32], glinting: &[bool]) -> Result<(), Failure> {
+    let counted = flakes.iter().zip(glinting).filter(|(_, glinting)| **glinting);
+    let greatest = counted.map(|(flakes, _)| f64::from(*flakes)).fold(0.0, f64::max);
+    let most = (8.0 * greatest + 2000.0).min(MOST).ceil();
+    Ok(open.session.renderer.set(None, "most", &most.to_string())?)
 }
 
 impl Parts {

@@ -1,11 +1,12 @@
 //! `mica accuracy -o DIR`: measures what is missing in a study, and keeps every point as soon as it is finished.
 
+use super::Folder;
 use super::effort::Effort;
 use super::measure::{measure, unmeasured};
 use super::place::OpenPlace;
 use super::plan::{self, Stop};
 use super::reference::Reference;
-use super::store::{Folder, picture_names, reference_names};
+use super::store::{picture_names, reference_names};
 use super::tables;
 use crate::args::{AccuracyArgs, SceneArgs};
 use crate::error::{Failure, INTERRUPTED};
@@ -13,18 +14,17 @@ use crate::interrupt::Interrupt;
 use crate::output;
 use crate::progress::Progress;
 use mica_accuracy::Point;
+use mica_gpu::Executor;
 use mica_render::{MethodInfo, Rung};
-use std::path::Path;
 
-/// Measures, keeps, prints and draws.
+/// Measures what is missing, keeps it and prints all.
 pub fn study(
     args: &AccuracyArgs,
-    folder: &Path,
+    folder: &mut Folder,
     methods: &[&'static MethodInfo],
     interrupt: &Interrupt,
     progress: &mut Progress,
 ) -> Result<(), Failure> {
-    let mut folder = Folder::open(folder)?;
     let scenes = if args.scene.is_empty() { plan::scenes(args.quick) } else { args.scene.clone() };
     let default_size = if args.quick { [320, 180] } else { [640, 360] };
     let sizes = if args.size.is_empty() { vec![default_size] } else { args.size.clone() };
@@ -37,12 +37,13 @@ pub fn study(
         rungs: plan::rungs(methods, args.quick),
         interrupt,
         progress,
-        folder: &mut folder,
+        folder,
+        executor: None,
         worst: None,
         measured: 0,
     };
     let finished = stops.iter().try_for_each(|stop| run.stop(stop));
-    let (measured, worst) = (run.measured, run.worst.take());
+    let Run { measured, worst, folder, progress, .. } = run;
     progress.clear();
     if !args.quiet {
         let path = folder.path.join("points.jsonl");
@@ -76,6 +77,8 @@ struct Run<'a> {
     interrupt: &'a Interrupt,
     progress: &'a mut Progress,
     folder: &'a mut Folder,
+    /// That of the last place, if all went well there.
+    executor: Option<Executor>,
     /// Of the points that could not be measured.
     worst: Option<Failure>,
     measured: usize,
@@ -120,7 +123,8 @@ impl Run<'_> {
             no_cache: self.args.no_cache,
             ..SceneArgs::of("")
         };
-        let mut open = OpenPlace::open(&scene, stop.lighting, self.progress).map_err(Stopped::Place)?;
+        let earlier = self.executor.take();
+        let mut open = OpenPlace::open_on(earlier, &scene, stop.lighting, self.progress).map_err(Stopped::Place)?;
         let mut reference = None;
         while let Some((method, rung)) = self.rungs.get(*next).copied() {
             self.check_interrupt()?;
@@ -156,6 +160,7 @@ impl Run<'_> {
             self.measured += 1;
             shown.push(point);
         }
+        self.executor = Some(open.session.into_executor());
         Ok(())
     }
 

@@ -1,9 +1,7 @@
 //! A folder of a study: lines that are only ever appended, and files that are whole or not there.
 
-use super::effort::Effort;
 use super::place::OpenPlace;
-use super::reference::{Reference, ReferencePixels};
-use super::reference_file;
+use super::{Effort, Reference, ReferencePixels, reference_file};
 use crate::error::Failure;
 use crate::output::Destination;
 use mica_accuracy::{Machine, Place, Point, ReferenceLine};

@@ -4,7 +4,7 @@
 
 use super::effort::Effort;
 use super::place::OpenPlace;
-use crate::error::{Failure, INTERRUPTED};
+use crate::error::{Failure, INTERRUPTED, NO_DEVICE};
 use crate::interrupt::Interrupt;
 use crate::measure::{self, PassSum};
 use crate::session::{Shot, Wanted};
@@ -15,9 +15,9 @@ use mica_render::View;
 use std::collections::BTreeSet;
 use std::time::Instant;
 
-/// By how much a median of frame times moves from one run of the program to the next, over the frame: least half width
+/// By how much a median of frame times may move from one run of the program to the next, over the frame: least half width
 /// of every spread.
-const RUN_TO_RUN: f64 = 0.03;
+const RUN_TO_RUN: f64 = 0.05;
 
 /// Where times of frames come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,17 +34,18 @@ impl Clock {
     /// # Errors
     /// If it is no processor and measures no time.
     pub fn of(device: &DeviceInfo) -> Result<Self, Failure> {
-        if device.kind == DeviceKind::Cpu && mica_gpu::process_cpu_ns().is_some() {
-            return Ok(Self::Cpu);
-        }
-        if device.limits.timestamp_valid_bits > 0 {
-            return Ok(Self::Gpu);
-        }
-        let name = &device.name;
-        Err(Failure::with_code(
-            crate::error::NO_DEVICE,
-            format!("{name} measures no time (its queue's timestampValidBits is 0); choose another with --device"),
-        ))
+        let clock = Self::choose(device.kind, device.limits.timestamp_valid_bits, mica_gpu::process_cpu_ns().is_some());
+        clock.ok_or_else(|| {
+            let name = &device.name;
+            Failure::with_code(
+                NO_DEVICE,
+                format!("{name} measures no time (its queue's timestampValidBits is 0); choose another with --device"),
+            )
+        })
+    }
+
+    fn choose(kind: DeviceKind, valid_bits: u32, system_tells: bool) -> Option<Self> {
+        if kind == DeviceKind::Cpu && system_tells { Some(Self::Cpu) } else { (valid_bits > 0).then_some(Self::Gpu) }
     }
 
     /// The word in reports.
@@ -60,7 +61,7 @@ impl Clock {
             Self::Gpu => run.frame_ns,
             Self::Cpu => run.cpu_ns,
         };
-        let missing = || Failure::with_code(crate::error::NO_DEVICE, "the device gave no time for a frame; run again");
+        let missing = || Failure::with_code(NO_DEVICE, "the device gave no time for a frame; run again");
         ns.map(|ns| ns as f64).ok_or_else(missing)
     }
 }
@@ -146,7 +147,7 @@ pub(super) fn nothing_yet() -> Cost {
 }
 
 /// Makes what the method needs anew. Returns nanoseconds of what precedes the first frame, and of what the first frame
-/// makes; neither holds the compilation of shaders, nor what blocks rays, which is the scene's.
+/// makes, not a number where the device has no timestamps; neither holds the compilation of shaders, nor what blocks rays, which is the scene's.
 fn build(open: &mut OpenPlace, interrupt: &Interrupt) -> Result<(f64, f64), Failure> {
     loop {
         open.drop_tables()?;
@@ -158,7 +159,7 @@ fn build(open: &mut OpenPlace, interrupt: &Interrupt) -> Result<(f64, f64), Fail
         // Whatever ran for the first time compiled its shader, or built for the scene: once more.
         if names.is_subset(&open.built) {
             let precomputation = before.iter().map(|update| update.ns as f64).sum();
-            return Ok((precomputation, first.iter().filter_map(|sum| sum.ns).map(|ns| ns as f64).sum()));
+            return Ok((precomputation, first.iter().map(|sum| sum.ns.map_or(f64::NAN, |ns| ns as f64)).sum()));
         }
         open.built.extend(names);
     }
@@ -226,6 +227,21 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_clock_is_one_that_runs() {
+        for (kind, bits, system_tells, clock) in [
+            (DeviceKind::Discrete, 64, true, Some(Clock::Gpu)),
+            (DeviceKind::Integrated, 36, false, Some(Clock::Gpu)),
+            (DeviceKind::Discrete, 0, true, None),
+            (DeviceKind::Cpu, 64, true, Some(Clock::Cpu)),
+            (DeviceKind::Cpu, 0, true, Some(Clock::Cpu)),
+            (DeviceKind::Cpu, 64, false, Some(Clock::Gpu)),
+            (DeviceKind::Cpu, 0, false, None),
+        ] {
+            assert_eq!(Clock::choose(kind, bits, system_tells), clock, "{kind:?}, {bits} bits");
+        }
+    }
 
     #[test]
     fn a_spread_holds_every_round_and_what_runs_differ_by() {

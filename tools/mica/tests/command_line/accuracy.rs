@@ -83,6 +83,7 @@ fn what_cannot_be_measured_is_refused_in_one_line() {
         (&["accuracy", "--sheet", "a.exr"], ".png"),
         (&["accuracy", "--sheet", "missing/a.png"], "missing"),
         (&["accuracy", "--sheet", "a.png", "--size", "2000x10"], "1024"),
+        (&["accuracy", "--sheet", "a.png", "--size", "20x10", "--size", "30x10"], "one --size"),
         (&["accuracy", "--counts", "--device", "nobody"], "nobody"),
     ] {
         let error = failed_in_one_line(&run(arguments), if part == "nobody" { 3 } else { 2 });

@@ -112,8 +112,7 @@ fn a_failure_keeps_what_was_measured_before() {
 #[test]
 fn what_cannot_be_measured_is_refused_in_one_line() {
     for (arguments, code, part) in [
-        (&["bench"][..], 2, "--occlusion"),
-        (&["bench", "--occlusion", "--rays", "0"], 2, "--rays"),
+        (&["bench", "--occlusion", "--rays", "0"][..], 2, "--rays"),
         (&["bench", "--occlusion", "--rounds", "0"], 2, "--rounds"),
         (&["bench", "--occlusion", "--rays", "4294967295"], 2, "rays at once"),
         (&["bench", "--occlusion", "--size", "16384x16384"], 2, "--size"),

@@ -8,6 +8,7 @@ mod occlusion;
 mod oracle;
 mod render;
 mod report;
+mod study;
 
 use serde_json::Value as Json;
 use std::path::{Path, PathBuf};
