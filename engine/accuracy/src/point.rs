@@ -268,6 +268,11 @@ impl Estimate {
         Self { value, low: value, high: value }
     }
 
+    /// The same in another unit.
+    pub fn scaled(self, factor: f64) -> Self {
+        Self { value: self.value * factor, low: self.low * factor, high: self.high * factor }
+    }
+
     /// The same of what cannot be below 0.
     pub(crate) fn at_least_zero(self) -> Self {
         let cut = |value: f64| if value < 0.0 { 0.0 } else { value };

@@ -199,6 +199,10 @@ pub struct BenchArgs {
     /// ready, how many bytes it keeps, how many rays a second it answers, and how often the bodies disagree.
     #[arg(long, conflicts_with_all = ["method", "lighting"])]
     pub occlusion: bool,
+    /// The tables and figures of a paper for this implementation, with the paper's own numbers and hardware beside them:
+    /// of Wang, Deng and Holzschuch 2020, Tables 1 to 3 and Figures 9 and 10, on shoe, snow and cloth up to 1920x1080.
+    #[arg(long, value_enum, conflicts_with_all = ["occlusion", "method", "lighting", "scene"])]
+    pub paper: Option<Paper>,
     /// Embedded scenes or .gltf or .glb files. Default: shoe; with --occlusion drift too, with its million triangles.
     #[arg(value_name = "SCENE")]
     pub scene: Vec<PathBuf>,
@@ -398,6 +402,12 @@ pub enum OcclusionChoice {
     RayQuery,
     Bvh,
     None,
+}
+
+/// A paper whose tables are drawn anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Paper {
+    Wdh20,
 }
 
 /// What is measured.

@@ -6,11 +6,16 @@ mod occlusion;
 mod rays;
 mod report;
 mod tables;
+mod wdh20;
 
-use crate::args::BenchArgs;
+use crate::args::{BenchArgs, Paper};
 use crate::error::Failure;
 
 /// Measures what was asked for.
 pub fn bench(args: &BenchArgs) -> Result<(), Failure> {
-    if args.occlusion { occlusion::occlusion(args) } else { methods::methods(args) }
+    match args.paper {
+        Some(Paper::Wdh20) => wdh20::wdh20(args),
+        None if args.occlusion => occlusion::occlusion(args),
+        None => methods::methods(args),
+    }
 }

@@ -21,4 +21,4 @@ pub use reference::{Reference, ReferencePixels};
 pub use run::study;
 pub use store::{Folder, Lines};
 pub use tables::of_place as table_of;
-pub use timing::paired;
+pub use timing::{paired, spread};

@@ -204,7 +204,7 @@ fn of_passes(frames: &[Vec<PassSum>]) -> Vec<(String, Estimate)> {
 }
 
 /// Median, least and greatest of some values, the ends at least so far from the median.
-fn spread(values: impl Iterator<Item = f64> + Clone, least_half_width: f64) -> Estimate {
+pub fn spread(values: impl Iterator<Item = f64> + Clone, least_half_width: f64) -> Estimate {
     let value = median(values.clone());
     Estimate {
         value,
