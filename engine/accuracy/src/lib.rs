@@ -1,6 +1,7 @@
 //! Methods measured: what they show against what the oracle says they should.
 
 mod bands;
+mod choice;
 mod counts;
 mod errors;
 pub mod exactness;
@@ -15,6 +16,7 @@ mod sparkle;
 mod stage;
 mod tiles;
 
+pub use choice::{Choice, Goal, NothingFits, choose};
 pub use counts::{CountErrors, CountLaw};
 pub use errors::{ErrorsError, Pixels, Radiance, Reference};
 pub use flip::{ErrorMap, displayed};

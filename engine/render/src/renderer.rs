@@ -182,14 +182,13 @@ impl Renderer {
         Ok(())
     }
 
-    /// Changes the method of one glinting material, by name, or of all of them. Settings that both methods have are kept.
+    /// Changes the method of one glinting material, by name, or of all of them. What was set is kept as far as the new
+    /// method has it and accepts the value; the rest is at the new method's defaults.
     pub fn set_method(&mut self, material: Option<&str>, method: &str) -> Result<(), SettingError> {
         let info = methods::method(method)?;
         for material in self.chosen(material)? {
             let mut values = info.values();
-            for (key, value) in material.values.iter() {
-                values.set(key, value);
-            }
+            values.adopt(&material.values);
             material.values = values;
             material.method = info;
         }

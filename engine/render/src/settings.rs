@@ -198,6 +198,17 @@ impl Values {
         }
     }
 
+    /// Takes over what was set of another method, as far as this one has such a setting and accepts the value. Defaults are
+    /// a method's own.
+    pub fn adopt(&mut self, other: &Self) {
+        for (key, value) in &other.set {
+            let setting = self.settings.iter().find(|setting| setting.key == *key);
+            if let Some((key, Ok(value))) = setting.map(|setting| (setting.key, setting.parse(&value.to_string()))) {
+                self.set.insert(key, value);
+            }
+        }
+    }
+
     /// The value of a setting.
     ///
     /// # Panics
@@ -241,5 +252,45 @@ impl Values {
     /// Every key with its value.
     pub fn iter(&self) -> impl Iterator<Item = (&'static str, Value)> + '_ {
         self.settings.iter().map(|setting| (setting.key, self.get(setting.key)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method;
+
+    fn values(name: &str) -> Values {
+        method(name).expect("there is such a method").values()
+    }
+
+    #[test]
+    fn a_method_has_its_own_defaults_whatever_was_used_before() {
+        for before in crate::METHODS {
+            for after in crate::METHODS {
+                let mut adopted = after.values();
+                adopted.adopt(&before.values());
+                assert_eq!(adopted, after.values(), "{} after {}", after.name, before.name);
+            }
+        }
+        assert_ne!(values("wang2020").get("samples"), values("jakob").get("samples"), "the test says something");
+    }
+
+    #[test]
+    fn what_was_set_is_kept_where_it_is_accepted() {
+        let mut before = values("wang2020");
+        let color = [1.0 / 3.0, 0.1, 1e-7];
+        before.set("color", Value::Color(color));
+        for (key, text) in
+            [("count", "987654321012"), ("alpha", "0.12345678901234567"), ("samples", "64"), ("dpf", "counted")]
+        {
+            assert_eq!(before.parse("wang2020", key, text), Ok(()));
+        }
+        let mut after = values("wang2018");
+        after.adopt(&before);
+        assert_eq!(after.number("count"), 987_654_321_012.0);
+        assert_eq!(after.number("alpha"), 0.123_456_789_012_345_67);
+        assert_eq!((after.color("color"), after.word("dpf")), (color, "counted"));
+        assert_eq!(after.get("samples"), values("wang2018").get("samples"), "64 are more than it takes");
     }
 }

@@ -1,5 +1,6 @@
 //! The command line: what may be typed, and what it means.
 
+use crate::budget::BudgetArgs;
 use crate::change::Change;
 use crate::study::Lighting;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -162,6 +163,8 @@ pub struct RenderArgs {
     /// Default: both, in frames of their own.
     #[arg(long, value_enum)]
     pub timing: Option<TimingChoice>,
+    #[command(flatten)]
+    pub budget: BudgetArgs,
     /// After the first frame, changes a setting and renders a frame (repeatable); the report says what each change made
     /// anew. All else that is reported, and the picture, are of the last state.
     #[arg(long, value_name = "[MATERIAL:]KEY=VALUE", value_parser = Change::of_any)]

@@ -3,6 +3,7 @@
 mod accuracy;
 mod args;
 mod bench;
+mod budget;
 mod build;
 mod change;
 mod charts;

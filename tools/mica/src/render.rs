@@ -1,6 +1,7 @@
 //! `mica render`: a picture, what it cost, and what was built for it.
 
 use crate::args::{RenderArgs, TimingChoice};
+use crate::budget::{self, BudgetReport};
 use crate::change::Change;
 use crate::error::{Failure, INTERRUPTED};
 use crate::interrupt::Interrupt;
@@ -25,7 +26,13 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let outputs = Outputs::check(args)?;
     let interrupt = Interrupt::new()?;
     let mut progress = Progress::new(args.quiet);
-    let mut session = Session::new(&args.scene, &mut progress)?;
+    let (mut session, budget) = match args.budget.wish() {
+        Some(wish) => {
+            let (session, report) = budget::choose_for(&args.scene, &wish, &interrupt, &mut progress)?;
+            (session, Some(report))
+        }
+        None => (Session::new(&args.scene, &mut progress)?, None),
+    };
     for edit in &args.edit {
         edit.check(session.renderer.materials())?;
     }
@@ -57,6 +64,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
             updates: &updates,
             interrupted: interrupt.requested(),
         },
+        budget,
     );
     for warning in report.rays.iter().filter_map(RaysReport::warning) {
         log::warn!("{warning}");
@@ -221,7 +229,7 @@ struct Outcome<'a> {
     interrupted: bool,
 }
 
-fn report(session: &Session, outcome: &Outcome) -> RenderReport {
+fn report(session: &Session, outcome: &Outcome, budget: Option<BudgetReport>) -> RenderReport {
     let Outcome { args, shot, measurements, .. } = *outcome;
     let mut of_picture = measure::sums(shot, false);
     of_picture.retain(|pass| !pass.name.starts_with("download "));
@@ -241,6 +249,7 @@ fn report(session: &Session, outcome: &Outcome) -> RenderReport {
         schema: SCHEMA,
         scene: session.scene.clone(),
         method: session.method(),
+        budget,
         settings: settings(session.renderer.materials()),
         size: session.view.size,
         samples: outcome.samples,

@@ -1,5 +1,6 @@
 //! The report of a render, as JSON.
 
+use crate::budget::BudgetReport;
 use crate::measure::{PassRow, TracedRays};
 use crate::picture::ImageSummary;
 use mica_gpu::{DeviceInfo, MemoryRow};
@@ -18,6 +19,9 @@ pub struct RenderReport {
     pub scene: String,
     /// Names of the methods in use, joined with `+`.
     pub method: String,
+    /// What chose them; absent without a budget or a wanted error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub budget: Option<BudgetReport>,
     /// By material: `method`, and every setting.
     pub settings: Json,
     pub size: [u32; 2],

@@ -20,6 +20,9 @@ pub fn for_people<'a>(report: &RenderReport, paths: impl Iterator<Item = &'a Pat
         report.device.driver,
         report.occlusion
     );
+    if let Some(budget) = &report.budget {
+        text += &format!("{}\n", budget.words());
+    }
     text += &every_frame_table(report);
     let FrameTimes { isolated_sum, overlapped_median, overlapped_cpu_median } = report.frame_ns;
     text += &format!(

@@ -1,7 +1,7 @@
 //! A scene on a device, set up as the command line says, and the frames that are made of it.
 
 use crate::args::{CameraChoice, SceneArgs};
-use crate::environment_choice;
+use crate::environment_choice::{self, ChosenEnvironment};
 use crate::error::Failure;
 use crate::measure::{self, TracedRays};
 use crate::occlusion_choice;
@@ -103,15 +103,15 @@ impl Declared {
     }
 }
 
-impl Session {
-    /// Loads the scene, finds a device, and applies all settings. No frame is made yet.
-    pub fn new(args: &SceneArgs, progress: &mut Progress) -> Result<Self, Failure> {
-        Self::on(None, args, progress)
-    }
+/// What is on the command line of a scene, loaded.
+pub struct Loaded {
+    chosen: ChosenScene,
+    environment: ChosenEnvironment,
+}
 
-    /// The same on the device of an earlier session, whose pipelines are there already: which device, how much memory and
-    /// which cache were decided then.
-    pub fn on(earlier: Option<Executor>, args: &SceneArgs, progress: &mut Progress) -> Result<Self, Failure> {
+impl Loaded {
+    /// Loads the scene and its environment.
+    pub fn new(args: &SceneArgs, progress: &mut Progress) -> Result<Self, Failure> {
         if let Some(name) = &args.method {
             method(name)?;
         }
@@ -123,6 +123,26 @@ impl Session {
         let environment =
             environment_choice::choose(args.env.as_deref(), args.env_rotate, &chosen, has_lights, progress)?;
         progress.clear();
+        Ok(Self { chosen, environment })
+    }
+
+    /// Letters that change with anything that is seen of both.
+    pub fn fingerprint(&self) -> String {
+        let map = self.environment.environment.as_ref().map(|environment| environment.map.fingerprint());
+        format!("{} {}", self.chosen.scene.fingerprint(), map.as_deref().unwrap_or("none"))
+    }
+}
+
+impl Session {
+    /// Loads the scene, finds a device, and applies all settings. No frame is made yet.
+    pub fn new(args: &SceneArgs, progress: &mut Progress) -> Result<Self, Failure> {
+        Self::of(Loaded::new(args, progress)?, args, None)
+    }
+
+    /// The same with a scene that is loaded already, and perhaps on the device of an earlier session, whose pipelines are
+    /// there already: which device, how much memory and which cache were decided then.
+    pub fn of(loaded: Loaded, args: &SceneArgs, earlier: Option<Executor>) -> Result<Self, Failure> {
+        let Loaded { chosen, environment } = loaded;
         let camera = args.camera.map_or_else(|| chosen.scene.default_camera(), camera);
         let exposure = args.exposure.exp2() as f32;
         let view = View { exposure, ..View::new(camera, args.size) };
@@ -166,6 +186,11 @@ impl Session {
             cache,
             asked_method: args.method.clone(),
         })
+    }
+
+    /// Where tables and measurements are kept, if they are.
+    pub fn cache(&self) -> Option<&Cache> {
+        self.cache.as_ref()
     }
 
     /// The device.

@@ -6,6 +6,7 @@ mod centre;
 mod environment;
 mod environment_file;
 mod error;
+mod fingerprint;
 mod gltf;
 mod light;
 mod material;

@@ -71,8 +71,8 @@ pub fn unmeasured(open: &OpenPlace, method: &MethodInfo, rung: &Rung, effort: &s
 }
 
 /// A word as a POSIX shell takes it.
-fn shell_word(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./".contains(c);
+pub fn shell_word(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {
         word.to_owned()
     } else {

@@ -14,7 +14,7 @@ mod tables;
 mod timing;
 
 pub use effort::Effort;
-pub use measure::{measure, unmeasured};
+pub use measure::{measure, shell_word, unmeasured};
 pub use place::{Lighting, OpenPlace, machine};
 pub use plan::{Stop, rungs, stops};
 pub use reference::{Reference, ReferencePixels};

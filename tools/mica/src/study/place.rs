@@ -3,7 +3,7 @@
 use crate::args::SceneArgs;
 use crate::error::Failure;
 use crate::progress::Progress;
-use crate::session::{Session, Wanted};
+use crate::session::{Loaded, Session, Wanted};
 use mica_accuracy::{Machine, Place};
 use mica_gpu::{DeviceInfo, Executor, Timing};
 use mica_render::{COMMON_SETTINGS, GlintMaterial, MethodInfo};
@@ -83,7 +83,7 @@ impl OpenPlace {
     ) -> Result<Self, Failure> {
         let mut args = args.clone();
         lighting.apply(&mut args);
-        let session = Session::on(earlier, &args, progress)?;
+        let session = Session::of(Loaded::new(&args, progress)?, &args, earlier)?;
         if lighting == Lighting::Lights && session.renderer.scene().lights.is_empty() {
             let scene = &session.scene;
             return Err(Failure::bad_input(format!("{scene} has no lights; leave out --lighting lights for it")));

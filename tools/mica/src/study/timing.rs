@@ -158,8 +158,10 @@ fn build(open: &mut OpenPlace, interrupt: &Interrupt) -> Result<(f64, f64), Fail
             before.iter().map(|update| &update.pass).chain(first.iter().map(|sum| &sum.name)).cloned().collect();
         // Whatever ran for the first time compiled its shader, or built for the scene: once more.
         if names.is_subset(&open.built) {
-            let precomputation = before.iter().map(|update| update.ns as f64).sum();
-            return Ok((precomputation, first.iter().map(|sum| sum.ns.map_or(f64::NAN, |ns| ns as f64)).sum()));
+            // Folded, as the sum of no f64 is -0.
+            let precomputation = before.iter().fold(0.0, |sum, update| sum + update.ns as f64);
+            let tables = first.iter().fold(0.0, |all, sum| all + sum.ns.map_or(f64::NAN, |ns| ns as f64));
+            return Ok((precomputation, tables));
         }
         open.built.extend(names);
     }

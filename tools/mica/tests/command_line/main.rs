@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod bench;
+mod budget;
 mod information;
 mod mistakes;
 mod occlusion;
