@@ -204,7 +204,7 @@ pub struct BenchArgs {
     pub occlusion: bool,
     /// The tables and figures of a paper for this implementation, with the paper's own numbers and hardware beside them:
     /// of Wang, Deng and Holzschuch 2020, Tables 1 to 3 and Figures 9 and 10, on shoe, snow and cloth up to 1920x1080.
-    #[arg(long, value_enum, conflicts_with_all = ["occlusion", "method", "lighting", "scene"])]
+    #[arg(long, value_enum, conflicts_with_all = ["occlusion", "method", "lighting"])]
     pub paper: Option<Paper>,
     /// Embedded scenes or .gltf or .glb files. Default: shoe; with --occlusion drift too, with its million triangles.
     #[arg(value_name = "SCENE")]
@@ -288,7 +288,8 @@ pub struct AccuracyArgs {
     /// A contact sheet of all methods on all embedded scenes but the large one.
     #[arg(long, value_name = "FILE.png")]
     pub sheet: Option<PathBuf>,
-    /// Draws the report of a study anew from what is in its folder (-o), and measures nothing.
+    /// Draws the report of a study anew from what is in its folder (-o), and measures nothing. Older charts in
+    /// plots/ stay where there is none of their name any more.
     #[arg(long, requires = "output", conflicts_with_all = ["counts", "sheet", "exactness", "scene"])]
     pub redraw: bool,
     /// A method to look at (repeatable). Default: all.

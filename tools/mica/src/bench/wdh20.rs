@@ -15,7 +15,7 @@ use mica_render::{MethodInfo, Rung, method};
 use serde::Serialize;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What lines of a paper's tables say of themselves.
 const SCHEMA: &str = "mica-paper-1";
@@ -27,6 +27,7 @@ const THEIR_SIZE: [u32; 2] = [1920, 1080];
 const THEIR_SAMPLES: f64 = 1024.0;
 
 /// What the paper prints of a scene.
+#[derive(Debug, PartialEq)]
 struct TheirScene {
     name: &'static str,
     /// Milliseconds of what glints add, and of the frame.
@@ -54,12 +55,37 @@ const THEIR_MEMORY: [(&str, &str, f64); 4] = [
     ("probabilities of all roughnesses", "dpf", 46.7),
 ];
 
-/// A table made anew by an edit: the passes that do so here, what is edited, and the paper's Table 3, ms of Shoe.
-const THEIR_EDITS: [(&str, &[&str], (&str, [&str; 2]), f64); 3] = [
-    ("quadtree", &["quadtree"], ("count", ["9e5", "1e6"]), 6.4),
-    ("prefilter", &["prefilter_probability", "prefilter"], ("gamma_deg", ["5", "6"]), 8.0),
-    ("accumulation over gamma", &["dpf_accumulate"], ("gamma_deg", ["5", "6"]), 2.7),
+/// A table made anew by an edit.
+struct TheirEdit {
+    name: &'static str,
+    /// The passes that make it here.
+    passes: &'static [&'static str],
+    /// A setting of Shoe that changes it, and values to change between.
+    key: &'static str,
+    values: [&'static str; 2],
+    ms: f64,
+}
+
+/// Its Table 3.
+const THEIR_EDITS: [TheirEdit; 3] = [
+    TheirEdit { name: "quadtree", passes: &["quadtree"], key: "count", values: ["9e5", "1e6"], ms: 6.4 },
+    TheirEdit {
+        name: "prefilter",
+        passes: &["prefilter_probability", "prefilter"],
+        key: "gamma_deg",
+        values: ["5", "6"],
+        ms: 8.0,
+    },
+    TheirEdit {
+        name: "accumulation over gamma",
+        passes: &["dpf_accumulate"],
+        key: "gamma_deg",
+        values: ["5", "6"],
+        ms: 2.7,
+    },
 ];
+/// Of all of them together, milliseconds.
+const THEIR_EDITS_MS: f64 = 17.1;
 
 /// Shares of the side of the largest picture in Figure 10.
 const SIDES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
@@ -95,30 +121,36 @@ struct Entry<'a> {
 /// The numbers as they come: into a file, and into the table for people.
 struct Numbers {
     file: Option<File>,
+    to_stdout: bool,
     rows: Vec<Vec<String>>,
 }
 
 impl Numbers {
     fn create(path: Option<&Path>) -> Result<Self, Failure> {
+        let to_stdout = path == Some(Path::new("-"));
         let open = |path: &Path| {
             let file = OpenOptions::new().create(true).append(true).open(path);
             file.map_err(|error| Failure::bad_input(format!("{}: {error}", path.display())))
         };
-        Ok(Self { file: path.map(open).transpose()?, rows: Vec::new() })
+        Ok(Self { file: path.filter(|_| !to_stdout).map(open).transpose()?, to_stdout, rows: Vec::new() })
     }
 
     fn add(&mut self, machine: &Machine, entry: Entry, ours: Option<Estimate>) -> Result<(), Failure> {
         let Entry { table, row, column, unit, theirs, theirs_on, note } = entry;
         let line =
             Line { schema: SCHEMA, paper: "wdh20", table, row, column, unit, ours, theirs, theirs_on, machine, note };
+        let text = serde_json::to_string(&line).map_err(|error| Failure::bad_input(error.to_string()))?;
+        if self.to_stdout {
+            output::print(&format!("{text}\n"))?;
+        }
         if let Some(file) = &mut self.file {
-            let text = serde_json::to_string(&line).map_err(|error| Failure::bad_input(error.to_string()))?;
             let written = writeln!(file, "{text}").and_then(|()| file.flush());
             written.map_err(|error| Failure::bad_input(format!("the lines cannot be written: {error}")))?;
         }
+        let known = ours.filter(|ours| ours.value.is_finite());
         let words = |figure: Option<f64>| figure.map_or_else(|| "-".to_owned(), |figure| format!("{figure:.3}"));
-        let spread = ours.map_or_else(String::new, |Estimate { low, high, .. }| format!("{low:.3} to {high:.3}"));
-        let ours = words(ours.map(|ours| ours.value));
+        let spread = known.map_or_else(String::new, |Estimate { low, high, .. }| format!("{low:.3} to {high:.3}"));
+        let ours = words(known.map(|ours| ours.value));
         self.rows.push(vec![
             table.to_owned(),
             row.to_owned(),
@@ -155,16 +187,16 @@ impl Numbers {
 pub fn wdh20(args: &BenchArgs) -> Result<(), Failure> {
     let size = args.size.last().copied().unwrap_or(THEIR_SIZE);
     let effort = &Effort { path_frames: 0, rounds: [2, args.rounds.max(2)], isolated: 3, ..Effort::quick() };
-    let to_stdout = args.json.as_deref() == Some(Path::new("-"));
-    let mut numbers = Numbers::create(args.json.as_deref().filter(|_| !to_stdout))?;
+    let scenes = scenes(&args.scene)?;
+    let mut numbers = Numbers::create(args.json.as_deref())?;
     let interrupt = Interrupt::new()?;
     let mut progress = Progress::new(args.quiet);
     let mut paper = Paper { args, size, effort, interrupt: &interrupt, numbers: &mut numbers, machine: None };
     interrupt.defer();
-    let done = THEIR_SCENES.iter().try_for_each(|scene| paper.scene(scene, &mut progress));
+    let done = scenes.into_iter().try_for_each(|scene| paper.scene(scene, &mut progress));
     let machine = paper.machine.take();
     progress.clear();
-    if !args.quiet {
+    if !(args.quiet || numbers.to_stdout) {
         output::print(&numbers.for_people(machine.as_ref()))?;
     }
     match done {
@@ -174,6 +206,20 @@ pub fn wdh20(args: &BenchArgs) -> Result<(), Failure> {
         }
         done => done,
     }
+}
+
+/// The scenes of these names, or all.
+fn scenes(names: &[PathBuf]) -> Result<Vec<&'static TheirScene>, Failure> {
+    if names.is_empty() {
+        return Ok(THEIR_SCENES.iter().collect());
+    }
+    let of_name = |name: &PathBuf| {
+        let known = THEIR_SCENES.iter().find(|scene| name == Path::new(scene.name));
+        known.ok_or_else(|| {
+            Failure::bad_input(format!("{}: the paper has shoe, snow and cloth; name one of them", name.display()))
+        })
+    };
+    names.iter().map(of_name).collect()
 }
 
 /// The paper being measured.
@@ -191,10 +237,11 @@ impl Paper<'_> {
     /// All that the paper says of a scene.
     fn scene(&mut self, theirs: &TheirScene, progress: &mut Progress) -> Result<(), Failure> {
         let wang2020 = method("wang2020")?;
+        let mut open = self.open(theirs.name, progress)?;
+        self.machine.get_or_insert_with(|| open.machine.clone());
         for share in SIDES {
+            open.resize(self.size.map(|side| ((f64::from(side) * share).round() as u32).max(1)));
             progress.update(&format!("{} at {share} of the size", theirs.name), 0, 0);
-            let mut open = self.open(theirs.name, share, progress)?;
-            self.machine.get_or_insert_with(|| open.machine.clone());
             if share == SIDES[0] {
                 self.of_energy(theirs, &mut open, wang2020, progress)?;
                 self.of_older_methods(theirs, &mut open)?;
@@ -213,9 +260,9 @@ impl Paper<'_> {
         Ok(())
     }
 
-    fn open(&self, scene: &str, share: f64, progress: &mut Progress) -> Result<OpenPlace, Failure> {
+    fn open(&self, scene: &str, progress: &mut Progress) -> Result<OpenPlace, Failure> {
         let args = SceneArgs {
-            size: self.size.map(|side| ((f64::from(side) * share).round() as u32).max(1)),
+            size: self.size,
             device: self.args.device.clone(),
             memory: self.args.memory,
             cache: self.args.cache.clone(),
@@ -354,7 +401,7 @@ impl Paper<'_> {
     /// Table 3: tables made anew by an edit of Shoe.
     fn of_edits(&mut self, open: &mut OpenPlace) -> Result<(), Failure> {
         let mut in_all: Vec<f64> = Vec::new();
-        for (row, passes, (key, values), theirs) in THEIR_EDITS {
+        for TheirEdit { name, passes, key, values, ms } in THEIR_EDITS {
             let mut times = Vec::new();
             for round in 0..self.effort.rounds[0].max(2) as usize {
                 if self.interrupt.requested() {
@@ -368,9 +415,9 @@ impl Paper<'_> {
             }
             in_all.resize(times.len().max(in_all.len()), 0.0);
             in_all.iter_mut().zip(&times).for_each(|(sum, time)| *sum += time);
-            self.of_edit(open, row, theirs, spread(times.iter().copied(), 0.0))?;
+            self.of_edit(open, name, ms, spread(times.iter().copied(), 0.0))?;
         }
-        self.of_edit(open, "all", 17.1, spread(in_all.iter().copied(), 0.0))
+        self.of_edit(open, "all", THEIR_EDITS_MS, spread(in_all.iter().copied(), 0.0))
     }
 
     fn of_edit(&mut self, open: &OpenPlace, row: &str, theirs: f64, ours: Estimate) -> Result<(), Failure> {
@@ -384,5 +431,50 @@ impl Paper<'_> {
             note: "shoe",
         };
         self.add(open, entry, ours)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_scenes_of_the_paper_are_taken() {
+        let of = |names: &[&str]| scenes(&names.iter().map(PathBuf::from).collect::<Vec<_>>());
+        let names = |names: &[&str]| of(names).map(|scenes| scenes.iter().map(|scene| scene.name).collect::<Vec<_>>());
+        assert_eq!(names(&[]), Ok(vec!["shoe", "snow", "cloth"]));
+        assert_eq!(names(&["cloth"]), Ok(vec!["cloth"]));
+        assert_eq!(of(&["plane"]).map(|_| ()).map_err(|failure| failure.code), Err(crate::error::BAD_INPUT));
+    }
+
+    #[test]
+    fn a_number_that_is_not_known_is_null_in_the_file_and_a_dash_in_the_table() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("papers.jsonl");
+        let machine = Machine {
+            device: "d".to_owned(),
+            driver: "1".to_owned(),
+            occlusion: "bvh".to_owned(),
+            build: "b".to_owned(),
+        };
+        let entry = |column, theirs| Entry {
+            table: "table 1",
+            row: "shoe",
+            column,
+            unit: "ms",
+            theirs,
+            theirs_on: THEIR_GPU,
+            note: "",
+        };
+        let mut numbers = Numbers::create(Some(&path)).expect("the file can be written");
+        numbers.add(&machine, entry("glints", Some(8.4)), Some(Estimate::UNKNOWN)).expect("a line");
+        numbers.add(&machine, entry("frame", None), Some(Estimate::exact(2.0))).expect("a line");
+        let text = std::fs::read_to_string(&path).expect("lines");
+        let lines: Vec<serde_json::Value> =
+            text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+        assert_eq!((&lines[0]["ours"]["value"], &lines[0]["theirs"]), (&serde_json::Value::Null, &8.4.into()));
+        assert_eq!((&lines[1]["ours"]["value"], &lines[1]["theirs"]), (&2.0.into(), &serde_json::Value::Null));
+        assert_eq!(numbers.rows[0][4..], ["-", "", "8.400"]);
+        assert_eq!(numbers.rows[1][4..], ["2.000", "2.000 to 2.000", "-"]);
     }
 }

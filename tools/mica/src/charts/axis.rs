@@ -7,6 +7,8 @@ use super::three_digits;
 pub struct Axis {
     range: [f64; 2],
     pixels: [f64; 2],
+    /// Where 0 is, which has no logarithm; none if no value is 0.
+    zero: Option<f64>,
 }
 
 /// A line across the chart.
@@ -20,36 +22,65 @@ pub struct Tick {
 
 /// An axis has ticks for this much at least, so that one point alone has an axis too.
 const LEAST_RATIO: f64 = 3.0;
-/// Space beyond the outermost values.
+/// Space beyond the outermost values: a factor, and a share of the axis, of which the larger counts.
 const MARGIN: f64 = 1.3;
+const MARGIN_SHARE: f64 = 0.06;
+/// Values below are 0.
+const LEAST: f64 = 1e-30;
+/// Pixels from the lower end to 0, and to where the logarithms begin.
+const ZERO: [f64; 2] = [10.0, 24.0];
 
 impl Axis {
-    /// An axis on which all values that are finite and positive lie.
+    /// An axis on which all values that are finite lie, those that are not positive at 0.
     pub fn around(values: impl Iterator<Item = f64>, pixels: [f64; 2]) -> Option<Self> {
-        let usable = values.filter(|value| value.is_finite() && *value > 1e-30 && *value < 1e30);
-        let (least, greatest) =
-            usable.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
-        if greatest == 0.0 {
-            return None;
+        let (mut least, mut greatest, mut has_zero) = (f64::INFINITY, 0.0_f64, false);
+        for value in values.filter(|value| value.is_finite() && *value < 1e30) {
+            if value > LEAST {
+                (least, greatest) = (least.min(value), greatest.max(value));
+            } else {
+                has_zero = true;
+            }
         }
-        let (mut low, mut high) = (least / MARGIN, greatest * MARGIN);
+        if greatest == 0.0 {
+            if !has_zero {
+                return None;
+            }
+            (least, greatest) = (1.0, 1.0);
+        }
+        let margin = MARGIN.max((greatest / least).powf(MARGIN_SHARE));
+        let (mut low, mut high) = (least / margin, greatest * margin);
         if high / low < LEAST_RATIO {
             let wider = (LEAST_RATIO / (high / low)).sqrt();
             (low, high) = (low / wider, high * wider);
         }
-        Some(Self { range: [low, high], pixels })
+        let range = [low, high];
+        let [zero, start] = ZERO.map(|away| pixels[0] + away * (pixels[1] - pixels[0]).signum());
+        Some(if has_zero {
+            Self { range, pixels: [start, pixels[1]], zero: Some(zero) }
+        } else {
+            Self { range, pixels, zero: None }
+        })
     }
 
-    /// Where a value lies, also beyond the ends; what is not positive lies at the lower end.
+    /// Where 0 is, if a value is.
+    pub const fn zero(&self) -> Option<f64> {
+        self.zero
+    }
+
+    /// Where a value lies, also beyond the ends; what is not positive lies at 0, or at the lower end.
     pub fn at(&self, value: f64) -> f64 {
         let [low, high] = self.range;
-        let share = if value > 0.0 { (value / low).ln() / (high / low).ln() } else { 0.0 };
+        if value <= LEAST {
+            return self.zero.unwrap_or(self.pixels[0]);
+        }
+        let share = (value / low).ln() / (high / low).ln();
         self.pixels[0] + share * (self.pixels[1] - self.pixels[0])
     }
 
     /// The same, at the nearer end if it is beyond.
     pub fn within(&self, value: f64) -> f64 {
-        self.at(value.clamp(self.range[0], self.range[1]))
+        let low = if self.zero.is_some() && value <= LEAST { value } else { self.range[0] };
+        self.at(value.clamp(low, self.range[1]))
     }
 
     /// Whether a value lies between the ends.
@@ -146,6 +177,19 @@ mod tests {
 
     #[test]
     fn what_cannot_be_drawn_makes_no_axis() {
-        assert_eq!(Axis::around([0.0, -1.0, f64::NAN, f64::INFINITY, 1e300].into_iter(), [0.0, 1.0]), None);
+        assert_eq!(Axis::around([f64::NAN, f64::INFINITY, 1e300].into_iter(), [0.0, 1.0]), None);
+    }
+
+    #[test]
+    fn zero_lies_apart_from_logarithms_and_inside_the_chart() {
+        for pixels in [[10.0, 210.0], [210.0, 10.0]] {
+            let axis = Axis::around([0.0, -2.0, 1.0, 100.0].into_iter(), pixels).expect("an axis");
+            let zero = axis.zero().expect("a place for 0");
+            assert_eq!((axis.at(0.0), axis.within(-2.0)), (zero, zero));
+            let [first, least] = [zero, axis.at(1.0)].map(|at| (at - pixels[0]).abs());
+            assert!(first > 5.0 && least > first + 10.0, "{first} {least}");
+        }
+        assert!(Axis::around([0.0].into_iter(), [0.0, 100.0]).is_some_and(|axis| !axis.ticks().is_empty()));
+        assert_eq!(Axis::around([1.0].into_iter(), [0.0, 100.0]).and_then(|axis| axis.zero()), None);
     }
 }

@@ -2,6 +2,7 @@
 
 mod axis;
 mod bars;
+mod facets;
 mod labels;
 mod lines;
 mod palette;
@@ -11,10 +12,11 @@ mod svg;
 mod text;
 
 pub use bars::{Bar, Bars};
+pub use facets::{Facet, Facets};
 pub use lines::{Line, Lines};
 pub use palette::{Look, look_of, look_of_number, swatch};
 pub use png::png;
-pub use scatter::{Mark, Scatter, Series};
+pub use scatter::{Labelled, Mark, Scatter, Series};
 pub use svg::{Use, escaped, svg};
 
 /// A finished chart, in pixels from the top left.

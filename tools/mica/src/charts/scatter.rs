@@ -15,8 +15,15 @@ pub struct Scatter {
     /// What no series can do better than, except by chance.
     pub floor: Option<f64>,
     pub series: Vec<Series>,
-    /// Whether every mark is labelled, rather than those of the front, beside a legend.
-    pub all_labelled: bool,
+    pub labelled: Labelled,
+}
+
+/// Which marks have their names beside them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Labelled {
+    None,
+    Front,
+    All,
 }
 
 /// The rungs of one method.
@@ -33,8 +40,22 @@ pub struct Mark {
     /// By which a page finds what belongs to it.
     pub key: String,
     pub name: String,
+    /// What else a reader is told who points at it; may be empty.
+    pub what: String,
     pub time: Estimate,
     pub error: Estimate,
+}
+
+/// Where a chart is drawn within a drawing, and along which axes.
+pub struct Frame {
+    /// Two corners.
+    pub area: [[f64; 2]; 2],
+    pub x: Axis,
+    pub y: Axis,
+    /// Whether numbers stand below and to the left.
+    pub numbers: [bool; 2],
+    /// Radii of markers in the front and elsewhere.
+    pub radii: [f64; 2],
 }
 
 /// A mark that can be drawn, where it is drawn.
@@ -52,17 +73,19 @@ const WIDTH: f64 = 760.0;
 const LEFT: f64 = 66.0;
 const TOP: f64 = 34.0;
 const BOTTOM: f64 = 52.0;
-/// Radii of markers in the front and elsewhere.
-const LARGE: f64 = 7.5;
-const SMALL: f64 = 3.6;
+const RADII: [f64; 2] = [7.5, 3.6];
+/// How far numbers of an axis may reach beyond its end.
+const ROOM_BESIDE: f64 = 12.0;
 /// With more points in the front than this, only the most accurate of each series has a label.
 const MOST_LABELS: usize = 9;
 /// How opaque is what the front beats.
 const PALE: f64 = 0.5;
 
-/// Where a figure can be told from 0, itself; else the upper end of its interval, below which it lies.
+/// Where a figure can be told from 0, itself; else the upper end of its interval, below which it lies, or 0.
 pub fn shown(figure: Estimate) -> f64 {
-    if is_bound(figure) { figure.high } else { figure.value }
+    let shown = if is_bound(figure) { figure.high } else { figure.value };
+    // Not `max`, which makes a number of what is none.
+    if shown < 0.0 { 0.0 } else { shown }
 }
 
 /// An interval that is not known (NaN) bounds nothing.
@@ -83,14 +106,9 @@ impl Scatter {
     pub fn draw(&self) -> Drawing {
         let mut drawing = Drawing::new([WIDTH, HEIGHT], self.title.clone());
         drawing.bold([LEFT, 18.0], Anchor::Start, 13.0, Ink::Words, self.title.clone());
-        let legend = if self.all_labelled { 20.0 } else { 46.0 + self.legend_width() };
-        let (right, bottom) = (WIDTH - legend, HEIGHT - BOTTOM);
-        let marks = || self.series.iter().flat_map(|series| &series.marks).filter(|mark| can_be_drawn(mark));
-        let x = Axis::around(marks().map(|mark| shown(mark.time)), [LEFT, right]);
-        // The floor is seen where it is, if that is not so far off that nothing else could be told apart.
-        let least = marks().map(|mark| shown(mark.error)).fold(f64::INFINITY, f64::min);
-        let floor = self.floor.filter(|floor| *floor > least / 30.0);
-        let y = Axis::around(marks().map(|mark| shown(mark.error)).chain(floor), [bottom, TOP]);
+        let (right, bottom) = (WIDTH - 46.0 - self.legend_width(), HEIGHT - BOTTOM);
+        let x = Axis::around(self.times(), [LEFT, right]);
+        let y = Axis::around(self.errors().chain(self.floor_in_sight()), [bottom, TOP]);
         let (Some(x), Some(y)) = (x, y) else {
             drawing.text(
                 [LEFT, TOP + 30.0],
@@ -102,6 +120,37 @@ impl Scatter {
             return drawing;
         };
         let area = [[LEFT, TOP], [right, bottom]];
+        let on_front = self.draw_in(&mut drawing, &Frame { area, x, y, numbers: [true; 2], radii: RADII });
+        let middle = f64::midpoint(LEFT, right);
+        drawing.text([middle, bottom + 38.0], Anchor::Middle, 12.0, Ink::Words, self.time.clone());
+        drawing.upwards([17.0, f64::midpoint(TOP, bottom)], 12.0, Ink::Words, self.error.clone());
+        self.draw_legend(&mut drawing, &on_front, right + 22.0);
+        drawing
+    }
+
+    fn marks(&self) -> impl Iterator<Item = &Mark> {
+        self.series.iter().flat_map(|series| &series.marks).filter(|mark| can_be_drawn(mark))
+    }
+
+    /// What the axis of time has to hold.
+    pub fn times(&self) -> impl Iterator<Item = f64> {
+        self.marks().map(|mark| shown(mark.time))
+    }
+
+    /// What the axis of error has to hold.
+    pub fn errors(&self) -> impl Iterator<Item = f64> {
+        self.marks().map(|mark| shown(mark.error))
+    }
+
+    /// The floor is seen where it is, if that is not so far off that nothing else could be told apart.
+    fn floor_in_sight(&self) -> Option<f64> {
+        let least = self.errors().fold(f64::INFINITY, f64::min);
+        self.floor.filter(|floor| *floor > least / 30.0)
+    }
+
+    /// Everything between the axes, and their numbers. Returns the series on the front, the fastest first.
+    pub fn draw_in(&self, drawing: &mut Drawing, frame: &Frame) -> Vec<usize> {
+        let Frame { area, x, y, .. } = frame;
         let chosen = self.front();
         let mut drawn: Vec<Drawn<'_>> = Vec::new();
         for (series, one) in self.series.iter().enumerate() {
@@ -111,55 +160,30 @@ impl Scatter {
                 Drawn { series, mark, time, error, at: [x.within(time), y.within(error)], is_front }
             }));
         }
-        let steps = steps(&drawn, area);
-        self.draw_paper(&mut drawing, &x, &y, area, &steps);
-        if let Some(floor) = floor {
-            draw_floor(&mut drawing, y.within(floor), area);
+        let steps = steps(&drawn, *area);
+        draw_paper(drawing, frame, &steps);
+        let floor = self.floor_in_sight().map(|floor| y.within(floor));
+        if let Some(at) = floor {
+            drawing.rectangle([area[0][0], at], area[1], Ink::Floor);
+            drawing.line(&[[area[0][0], at], [area[1][0], at]], Stroke::dashed(Ink::Aside, 1.2));
         }
         for series in 0..self.series.len() {
-            self.draw_ladder(&mut drawing, drawn.iter().filter(|one| one.series == series));
+            self.draw_ladder(drawing, drawn.iter().filter(|one| one.series == series));
         }
         if steps.len() > 1 {
-            drawing.line(&steps, Stroke::solid(Ink::Words, 2.4));
+            drawing.line(&steps, Stroke::solid(Ink::Words, 2.4 * frame.radii[0] / RADII[0]));
         }
         // What matters most is drawn last.
         for is_front in [false, true] {
             for one in drawn.iter().filter(|one| one.is_front == is_front) {
-                drawing.shapes.push(self.point(one, &x, &y));
+                drawing.shapes.push(self.point(one, frame));
             }
         }
-        self.draw_labels(&mut drawing, &drawn, area, steps);
-        if !self.all_labelled {
-            self.draw_legend(&mut drawing, &drawn, right + 22.0);
-        }
-        drawing
-    }
-
-    fn draw_paper(&self, drawing: &mut Drawing, x: &Axis, y: &Axis, area: [[f64; 2]; 2], steps: &[[f64; 2]]) {
-        let [[left, top], [right, bottom]] = area;
-        if let [first, .., last] = steps {
-            let mut beaten = steps.to_vec();
-            beaten.extend([[right, last[1]], [right, top], [first[0], top]]);
-            drawing.shapes.push(Shape::Line { points: beaten, closed: true, fill: Some(Ink::Beaten), stroke: None });
-        }
-        for (ticks, is_time) in [(x.ticks(), true), (y.ticks(), false)] {
-            for tick in ticks {
-                let ends =
-                    if is_time { [[tick.at, top], [tick.at, bottom]] } else { [[left, tick.at], [right, tick.at]] };
-                let thickness = if tick.label.is_some() { 1.0 } else { 0.4 };
-                drawing.line(&ends, Stroke::solid(Ink::Grid, thickness));
-                let Some(label) = tick.label else { continue };
-                let (at, anchor) = if is_time {
-                    ([tick.at, bottom + 16.0], Anchor::Middle)
-                } else {
-                    ([left - 7.0, tick.at + 4.0], Anchor::End)
-                };
-                drawing.text(at, anchor, 11.0, Ink::Aside, label);
-            }
-        }
-        drawing.line(&[[left, top], [left, bottom], [right, bottom]], Stroke::solid(Ink::Aside, 1.0));
-        drawing.text([(left + right) / 2.0, bottom + 38.0], Anchor::Middle, 12.0, Ink::Words, self.time.clone());
-        drawing.upwards([17.0, (top + bottom) / 2.0], 12.0, Ink::Words, self.error.clone());
+        let taken = floor.map(|at| draw_floor_words(drawing, at, *area));
+        self.draw_labels(drawing, &drawn, frame, steps, taken);
+        let mut on_front: Vec<&Drawn<'_>> = drawn.iter().filter(|one| one.is_front).collect();
+        on_front.sort_by(|a, b| a.time.total_cmp(&b.time));
+        on_front.iter().map(|one| one.series).collect()
     }
 
     fn colour(&self, series: usize, opacity: f64) -> Ink {
@@ -173,29 +197,32 @@ impl Scatter {
         let points: Vec<[f64; 2]> = rungs.iter().map(|rung| rung.at).collect();
         if let [first, _, ..] = rungs.as_slice() {
             let opacity = if rungs.iter().any(|rung| rung.is_front) { 0.75 } else { 0.35 };
-            drawing.line(&points, Stroke::solid(self.colour(first.series, opacity), 1.1));
+            drawing.shapes.extend(long_line(&points, Stroke::solid(self.colour(first.series, opacity), 1.1)));
         }
     }
 
-    fn point(&self, drawn: &Drawn<'_>, x: &Axis, y: &Axis) -> Shape {
+    fn point(&self, drawn: &Drawn<'_>, Frame { x, y, radii, .. }: &Frame) -> Shape {
         let Drawn { series, mark, at, is_front, .. } = drawn;
         let Some(look) = self.series.get(*series).map(|series| series.look) else {
             return line(&[], Stroke::solid(Ink::Aside, 0.0));
         };
         let opacity = if *is_front { 1.0 } else { PALE };
         let ink = Ink::Own(look.colour, opacity);
-        let radius = if *is_front { LARGE } else { SMALL };
+        let radius = radii[usize::from(!*is_front)];
         let bars = Stroke::solid(ink, if *is_front { 1.4 } else { 0.8 });
         let mut shapes = Vec::new();
         for (figure, axis, along) in [(mark.time, x, 0), (mark.error, y, 1)] {
             let end = |value: f64| if along == 0 { [axis.within(value), at[1]] } else { [at[0], axis.within(value)] };
-            if is_bound(figure) {
+            if shown(figure) == 0.0 {
+                // Where it is: there is nothing less.
+            } else if is_bound(figure) {
                 shapes.extend(arrow(*at, along, radius, bars));
             } else if figure.low.is_finite() && figure.high.is_finite() {
-                shapes.push(line(&[end(figure.low), end(figure.high)], bars));
+                shapes.extend(long_line(&[end(figure.low), end(figure.high)], bars));
             }
         }
-        let is_open = is_bound(mark.time) || is_bound(mark.error);
+        let is_at_most = |figure: Estimate| is_bound(figure) && shown(figure) > 0.0;
+        let is_open = is_at_most(mark.time) || is_at_most(mark.error);
         let outline = if *is_front { Stroke::solid(Ink::Words, 1.8) } else { Stroke::solid(ink, 1.2) };
         // Paper first: lines do not shine through what is pale.
         shapes.push(look.mark(*at, radius, Some(Ink::Paper), None));
@@ -204,9 +231,9 @@ impl Scatter {
             (false, true) => look.mark(*at, radius, Some(ink), Some(outline)),
             (false, false) => look.mark(*at, radius, Some(ink), None),
         });
-        let at_most = |figure: Estimate| if is_bound(figure) { "at most " } else { "" };
+        let at_most = |figure: Estimate| if is_at_most(figure) { "at most " } else { "" };
         let title = format!(
-            "{}: {} {}{}, {} {}{}{}",
+            "{}: {} {}{}, {} {}{}{}{}{}",
             mark.name,
             self.time,
             at_most(mark.time),
@@ -215,25 +242,39 @@ impl Scatter {
             at_most(mark.error),
             three_digits(drawn.error),
             if *is_front { "; on the front" } else { "" },
+            if mark.what.is_empty() { "" } else { ". " },
+            mark.what,
         );
         Shape::Point { key: mark.key.clone(), title, shapes }
     }
 
-    fn draw_labels(&self, drawing: &mut Drawing, drawn: &[Drawn<'_>], area: [[f64; 2]; 2], steps: Vec<[f64; 2]>) {
+    fn draw_labels(
+        &self,
+        drawing: &mut Drawing,
+        drawn: &[Drawn<'_>],
+        frame: &Frame,
+        steps: Vec<[f64; 2]>,
+        more: Option<[[f64; 2]; 2]>,
+    ) {
+        let [large, small] = frame.radii;
         let around = |one: &Drawn<'_>| {
-            let radius = if one.is_front { LARGE + 1.0 } else { SMALL };
+            let radius = if one.is_front { large + 1.0 } else { small };
             [one.at.map(|side| side - radius), one.at.map(|side| side + radius)]
         };
-        let taken: Vec<_> = drawn.iter().map(around).collect();
+        let taken: Vec<_> = drawn.iter().map(around).chain(more).collect();
         let on_front = || drawn.iter().filter(|one| one.is_front);
         let is_crowded = on_front().count() > MOST_LABELS;
         let is_best = |one: &Drawn<'_>| on_front().all(|other| other.series != one.series || other.error >= one.error);
         let mut labels: Vec<Label> = drawn
             .iter()
-            .filter(|one| self.all_labelled || (one.is_front && (!is_crowded || is_best(one))))
+            .filter(|one| match self.labelled {
+                Labelled::None => false,
+                Labelled::Front => one.is_front && (!is_crowded || is_best(one)),
+                Labelled::All => true,
+            })
             .map(|one| Label {
                 at: one.at,
-                radius: if one.is_front { LARGE } else { SMALL },
+                radius: if one.is_front { large } else { small },
                 words: one.mark.name.clone(),
                 bold: one.is_front,
                 ink: if one.is_front { Ink::Words } else { Ink::Aside },
@@ -245,7 +286,7 @@ impl Scatter {
             vec![[one.at[0], one.at[1] - half], [one.at[0], one.at[1] + half]]
         });
         let lines: Vec<Vec<[f64; 2]>> = std::iter::once(steps).chain(bars).collect();
-        place(drawing, &labels, area, &taken, &lines);
+        place(drawing, &labels, frame.area, &taken, &lines);
     }
 
     fn legend_width(&self) -> f64 {
@@ -253,11 +294,9 @@ impl Scatter {
     }
 
     /// Methods of the front first, in its order; then the others.
-    fn draw_legend(&self, drawing: &mut Drawing, drawn: &[Drawn<'_>], left: f64) {
-        let mut on_front: Vec<&Drawn<'_>> = drawn.iter().filter(|one| one.is_front).collect();
-        on_front.sort_by(|a, b| a.time.total_cmp(&b.time));
+    fn draw_legend(&self, drawing: &mut Drawing, on_front: &[usize], left: f64) {
         let mut order: Vec<usize> = Vec::new();
-        for series in on_front.iter().map(|one| one.series).chain(0..self.series.len()) {
+        for series in on_front.iter().copied().chain(0..self.series.len()) {
             if !order.contains(&series) {
                 order.push(series);
             }
@@ -265,7 +304,7 @@ impl Scatter {
         let mut y = TOP + 6.0;
         let mut was_front = true;
         for (k, series) in order.iter().filter_map(|k| Some((*k, self.series.get(*k)?))) {
-            let is_front = on_front.iter().any(|one| one.series == k);
+            let is_front = on_front.contains(&k);
             if was_front && !is_front {
                 y += 8.0;
             }
@@ -288,8 +327,49 @@ impl Scatter {
 fn can_be_drawn(mark: &Mark) -> bool {
     [mark.time, mark.error].iter().all(|figure| {
         let at = shown(*figure);
-        at.is_finite() && at > 1e-30 && at < 1e30
+        at.is_finite() && at < 1e30
     })
+}
+
+fn draw_paper(drawing: &mut Drawing, frame: &Frame, steps: &[[f64; 2]]) {
+    let [[left, top], [right, bottom]] = frame.area;
+    if let [first, .., last] = steps {
+        let mut beaten = steps.to_vec();
+        beaten.extend([[right, last[1]], [right, top], [first[0], top]]);
+        drawing.shapes.push(Shape::Line { points: beaten, closed: true, fill: Some(Ink::Beaten), stroke: None });
+    }
+    for (axis, is_time) in [(&frame.x, true), (&frame.y, false)] {
+        let ends = |at: f64| if is_time { [[at, top], [at, bottom]] } else { [[left, at], [right, at]] };
+        let has_numbers = frame.numbers[usize::from(!is_time)];
+        let number = |drawing: &mut Drawing, at: f64, words: String| {
+            let (place, anchor) =
+                if is_time { ([at, bottom + 16.0], Anchor::Middle) } else { ([left - 7.0, at + 4.0], Anchor::End) };
+            drawing.text(place, anchor, 11.0, Ink::Aside, words);
+        };
+        for tick in axis.ticks() {
+            let thickness = if tick.label.is_some() { 1.0 } else { 0.4 };
+            drawing.line(&ends(tick.at), Stroke::solid(Ink::Grid, thickness));
+            // Beside may be another chart, and numbers of its own.
+            let sticks_out =
+                |label: &String| is_time && tick.at + width(label, 11.0, false) / 2.0 > right + ROOM_BESIDE;
+            if let Some(label) = tick.label.filter(|label| has_numbers && !sticks_out(label)) {
+                number(drawing, tick.at, label);
+            }
+        }
+        if let Some(at) = axis.zero() {
+            drawing.line(&ends(at), Stroke::dashed(Ink::Aside, 1.0));
+            if has_numbers {
+                number(drawing, at, if is_time { "0" } else { "exact" }.to_owned());
+            }
+        }
+    }
+    drawing.line(&[[left, top], [left, bottom], [right, bottom]], Stroke::solid(Ink::Aside, 1.0));
+}
+
+/// A line, if it is longer than a point.
+fn long_line(points: &[[f64; 2]], stroke: Stroke) -> Option<Shape> {
+    let is_long = points.windows(2).any(|ends| (ends[0][0] - ends[1][0]).hypot(ends[0][1] - ends[1][1]) > 0.01);
+    is_long.then(|| line(points, stroke))
 }
 
 /// The steps along the front: down to each of its points, and on to the next.
@@ -308,13 +388,14 @@ fn steps(drawn: &[Drawn<'_>], [[_, top], [right, _]]: [[f64; 2]; 2]) -> Vec<[f64
     points
 }
 
-fn draw_floor(drawing: &mut Drawing, at: f64, [[left, _], [right, bottom]]: [[f64; 2]; 2]) {
-    drawing.rectangle([left, at], [right, bottom], Ink::Floor);
-    drawing.line(&[[left, at], [right, at]], Stroke::dashed(Ink::Aside, 1.2));
-    let below = at + 13.0;
-    let y = if below + 4.0 < bottom { below } else { at - 5.0 };
-    drawing.text([right - 6.0, y], Anchor::End, 10.5, Ink::Aside, "floor: the reference with other flakes");
-    drawing.line(&[[left, bottom], [right, bottom]], Stroke::solid(Ink::Aside, 1.0));
+/// Says what the floor is, over what lies there. Returns the area of the words.
+fn draw_floor_words(drawing: &mut Drawing, at: f64, [_, [right, bottom]]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+    let words = "floor: the reference with other flakes";
+    let y = if at + 17.0 < bottom { at + 13.0 } else { at - 5.0 };
+    let area = [[right - 8.0 - width(words, 10.5, false), y - 9.0], [right - 4.0, y + 3.0]];
+    drawing.rectangle(area[0], area[1], Ink::Veil);
+    drawing.text([right - 6.0, y], Anchor::End, 10.5, Ink::Aside, words);
+    area
 }
 
 /// A short arrow from a marker towards less, along x or y.
@@ -338,7 +419,13 @@ mod tests {
 
     fn mark(key: &str, time: (f64, f64, f64), error: (f64, f64, f64)) -> Mark {
         let estimate = |(low, value, high)| Estimate { value, low, high };
-        Mark { key: key.to_owned(), name: key.to_owned(), time: estimate(time), error: estimate(error) }
+        Mark {
+            key: key.to_owned(),
+            name: key.to_owned(),
+            what: String::new(),
+            time: estimate(time),
+            error: estimate(error),
+        }
     }
 
     fn chart(marks: Vec<Mark>) -> Scatter {
@@ -348,7 +435,7 @@ mod tests {
             error: "error".to_owned(),
             floor: Some(0.05),
             series: vec![Series { name: "method".to_owned(), look: look_of_number(0), marks }],
-            all_labelled: false,
+            labelled: Labelled::Front,
         }
     }
 
@@ -397,10 +484,33 @@ mod tests {
         let nan = f64::NAN;
         let scatter = chart(vec![
             mark("nan", (nan, nan, nan), (0.4, 0.5, 0.6)),
-            mark("zero", (0.0, 0.0, 0.0), (0.4, 0.5, 0.6)),
             mark("huge", (1.0, 1.0, 1.0), (0.0, 1.0, f64::INFINITY)),
         ]);
         assert_eq!(scatter.front(), [""; 0]);
         assert!(crate::charts::svg(&scatter.draw(), crate::charts::Use::Page).contains("Nothing was measured"));
+    }
+
+    #[test]
+    fn what_costs_nothing_or_is_exact_has_a_line_of_its_own_and_is_on_the_front() {
+        let scatter = chart(vec![
+            mark("free", (-3.0, -2.0, -1.0), (0.4, 0.5, 0.6)),
+            mark("exact", (9.0, 10.0, 11.0), (0.0, 0.0, 0.0)),
+            mark("beaten", (9.0, 10.0, 11.0), (0.5, 0.6, 0.7)),
+        ]);
+        assert_eq!(scatter.front(), ["free", "exact"]);
+        let drawing = scatter.draw();
+        let text = crate::charts::svg(&drawing, crate::charts::Use::Page);
+        assert!(text.contains(">0</text>") && text.contains(">exact</text>"), "{text}");
+        let found = points(&drawing);
+        assert_eq!(found.len(), 3);
+        assert!(found.iter().all(|point| !point.1.contains("at most")));
+    }
+
+    #[test]
+    fn intervals_of_no_length_are_not_drawn() {
+        let scatter = chart(vec![mark("one", (10.0, 10.0, 10.0), (0.5, 0.5, 0.5))]);
+        let drawing = scatter.draw();
+        let found = points(&drawing);
+        assert!(found[0].2.iter().all(|shape| matches!(shape, Shape::Disc { .. })), "{:?}", found[0].2);
     }
 }

@@ -32,6 +32,7 @@ struct Plot {
 }
 
 /// Draws what is in the folder of a study: `index.html`, and `plots/` as SVG and PNG. Returns what was written.
+/// Files in `plots/` of other names are left alone, be they of places that the study had once or somebody's own.
 pub fn write(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let study = Study::read(folder)?;
     let sections = Section::of(&study);

@@ -5,7 +5,7 @@ use super::figures::{FIGURES, further, scaled, tab, with_interval};
 use super::html::Html;
 use super::read::{Study, is_same_device};
 use super::{Plot, unused};
-use crate::charts::{Mark, Scatter, Series, Use, escaped, look_of, svg, swatch, three_digits};
+use crate::charts::{Labelled, Mark, Scatter, Series, Use, escaped, look_of, svg, swatch, three_digits};
 use crate::table::bytes;
 use mica_accuracy::{BandErrors, Metric, Place, Point, ReferenceLine};
 use mica_render::METHODS;
@@ -274,7 +274,7 @@ fn scatter(place: &Place, metric: Metric, points: &[Entry<'_>], reference: Optio
         let error = point.errors.as_ref().and_then(|errors| metric.of(errors)).filter(|error| error.value.is_finite());
         let Some(error) = error else { continue };
         let time = scaled(point.cost.glints, 1e-6);
-        let mark = Mark { key: slug.clone(), name: point.name(), time, error };
+        let mark = Mark { key: slug.clone(), name: point.name(), what: String::new(), time, error };
         match series.iter_mut().find(|one| one.name == point.method) {
             Some(one) => one.marks.push(mark),
             None => {
@@ -291,7 +291,7 @@ fn scatter(place: &Place, metric: Metric, points: &[Entry<'_>], reference: Optio
         error: metric.label().to_owned(),
         floor: floor.filter(|floor| floor.is_finite() && *floor > 0.0),
         series,
-        all_labelled: false,
+        labelled: Labelled::Front,
     }
 }
 

@@ -1,6 +1,7 @@
 //! What a study's folder holds: lines of JSON, of which the last of a kind counts.
 
 use crate::error::Failure;
+use mica_accuracy::exactness::{EXACTNESS_SCHEMA, ExactnessLine};
 use mica_accuracy::{Estimate, Machine, POINT_SCHEMA, Point, REFERENCE_SCHEMA, ReferenceLine};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -16,24 +17,6 @@ pub struct Study {
     pub papers: Vec<PaperLine>,
     /// How many lines of which file could not.
     pub skipped: Vec<(&'static str, usize)>,
-}
-
-/// A line of `exactness.jsonl`: one way to compute one thing.
-#[derive(Clone, Debug, Deserialize)]
-pub struct ExactnessLine {
-    pub chart: String,
-    /// Under which conditions, in words.
-    pub case: String,
-    pub rung: String,
-    /// What it computes, in a sentence.
-    pub what: String,
-    /// What the error is.
-    pub error_of: String,
-    pub error: Estimate,
-    pub ns: Estimate,
-    /// Of what the nanoseconds are the time.
-    pub per: String,
-    pub machine: Machine,
 }
 
 /// A line of `papers.jsonl`: a cell of a paper's table, ours beside theirs.
@@ -52,7 +35,6 @@ pub struct PaperLine {
     pub note: Option<String>,
 }
 
-const EXACTNESS_SCHEMA: &str = "mica-exactness-1";
 const PAPER_SCHEMA: &str = "mica-paper-1";
 
 impl Study {

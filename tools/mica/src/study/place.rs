@@ -118,6 +118,12 @@ impl OpenPlace {
         Ok(open)
     }
 
+    /// The same at another size.
+    pub fn resize(&mut self, size: [u32; 2]) {
+        self.place.size = size;
+        self.session.view.size = size;
+    }
+
     /// Sets all materials to a method with a rung's settings, and everything else to what the scene says.
     pub fn set(&mut self, method: &MethodInfo, rung: &[(&str, &str)]) -> Result<(), Failure> {
         for material in self.own.clone() {

@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 use std::time::Instant;
 
 /// By how much a median of frame times may move from one run of the program to the next, over the frame: least half width
-/// of every spread.
+/// of every spread, on a device that has nothing else to do ([`Clock::stretch`]).
 const RUN_TO_RUN: f64 = 0.05;
 
 /// Where times of frames come from.
@@ -64,6 +64,15 @@ impl Clock {
         let missing = || Failure::with_code(NO_DEVICE, "the device gave no time for a frame; run again");
         ns.map(|ns| ns as f64).ok_or_else(missing)
     }
+
+    /// How many times as long a frame lasts as its work takes, at least 1. A processor that others use as well lets frames
+    /// wait, and what they find in its caches then is others': even processor time is worth less the longer they do.
+    fn stretch(self, run: &Run) -> f64 {
+        match (self, run.frame_ns, run.cpu_ns) {
+            (Self::Cpu, Some(lasted), Some(worked)) if worked > 0 => (lasted as f64 / worked as f64).max(1.0),
+            _ => 1.0,
+        }
+    }
 }
 
 /// Builds the tables of the method in use and times its frames. The method and its settings are those of the place as it
@@ -84,6 +93,7 @@ pub fn paired(open: &mut OpenPlace, effort: &Effort, interrupt: &Interrupt) -> R
     frame(open, &without, Timing::Overlapped, interrupt)?;
 
     let mut rounds: Vec<[f64; 2]> = Vec::new();
+    let mut stretches = Vec::new();
     let [fewest, most] = effort.rounds.map(|rounds| rounds as usize);
     let begun = Instant::now();
     let mut plans = None;
@@ -96,6 +106,7 @@ pub fn paired(open: &mut OpenPlace, effort: &Effort, interrupt: &Interrupt) -> R
             let view = if is_without { &without } else { &with };
             let shot = frame(open, view, Timing::Overlapped, interrupt)?;
             ns[usize::from(is_without)] = clock.ns(&shot.run)?;
+            stretches.push(clock.stretch(&shot.run));
             runs[usize::from(is_without)] = Some(Needs::of(&shot.run.plan));
         }
         rounds.push(ns);
@@ -113,14 +124,15 @@ pub fn paired(open: &mut OpenPlace, effort: &Effort, interrupt: &Interrupt) -> R
     };
     let shared = needs_with.shared_bytes.saturating_sub(needs_without.shared_bytes);
     let glint_bytes = shared + memory.iter().filter(kept).map(|row| row.bytes).sum::<u64>();
+    let run_to_run = RUN_TO_RUN * median(stretches.into_iter());
     let typical = median(rounds.iter().map(|[with, _]| *with));
     let relative = typical / median(rounds.iter().map(|[_, without]| *without));
     Ok(Cost {
         clock: clock.name().to_owned(),
         rounds: rounds.len() as u32,
-        glints: spread(rounds.iter().map(|[with, without]| with - without), typical * RUN_TO_RUN),
-        frame: spread(rounds.iter().map(|[with, _]| *with), typical * RUN_TO_RUN),
-        ratio: spread(rounds.iter().map(|[with, without]| with / without), relative * RUN_TO_RUN),
+        glints: spread(rounds.iter().map(|[with, without]| with - without), typical * run_to_run),
+        frame: spread(rounds.iter().map(|[with, _]| *with), typical * run_to_run),
+        ratio: spread(rounds.iter().map(|[with, without]| with / without), relative * run_to_run),
         passes: of_passes(&passes),
         tables,
         precomputation,
