@@ -163,6 +163,9 @@ pub struct Point {
     pub machine: Machine,
     /// How much work was spent on measuring.
     pub effort: String,
+    /// Letters that change with anything that is seen of the scene and its environment; empty where nobody asked.
+    #[serde(default)]
+    pub content: String,
     /// The command line that renders this point.
     pub command: String,
     /// Its error; none where only time was measured.
@@ -184,6 +187,9 @@ pub struct ReferenceLine {
     pub machine: Machine,
     /// How much work was spent on it.
     pub effort: String,
+    /// As in [`Point`].
+    #[serde(default)]
+    pub content: String,
     /// Samples of each pixel.
     pub samples: u32,
     /// Standard deviation of a pixel's glints about what they converge to, over their mean.
@@ -291,8 +297,9 @@ impl Estimate {
 impl Point {
     /// Whether another line measures the same thing in the same way, so that this one need not be measured again.
     pub fn is_same_as(&self, other: &Self) -> bool {
-        let key = |point: &Self| {
-            (point.place.clone(), point.method.clone(), point.set.clone(), point.machine.clone(), point.effort.clone())
+        let key = |point: &'_ Self| {
+            let Self { schema, place, method, set, machine, effort, content, .. } = point.clone();
+            (schema, place, method, set, machine, effort, content)
         };
         key(self) == key(other)
     }

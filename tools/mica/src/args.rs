@@ -217,7 +217,7 @@ pub struct BenchArgs {
     #[arg(long, value_enum, default_values_t = [Lighting::Own])]
     pub lighting: Vec<Lighting>,
     /// With --occlusion: rays from what the camera sees, into all directions, and as many at most towards the first light.
-    #[arg(long, value_name = "N", default_value_t = 1 << 18, value_parser = clap::value_parser!(u32).range(1..), requires = "occlusion")]
+    #[arg(long, value_name = "N", default_value_t = 1 << 18, value_parser = clap::value_parser!(u32).range(1..), requires = "occlusion", conflicts_with_all = ["method", "lighting", "paper"])]
     pub rays: u32,
     /// Rounds that are measured, after those that warm up: fewer, but at least two, where they take more than 20 seconds.
     /// With --occlusion all of them, and each builds everything anew.
@@ -255,7 +255,7 @@ pub struct BenchArgs {
     after_long_help = "A study (-o DIR) compares one frame of every method, with every rung of its ladder (see `mica methods`), with a \
     reference of the same place, and times it: DIR/points.jsonl has a line for each point, DIR/references.jsonl one for \
     each place, and each point names the command that renders it. A point that is there already is not measured again, \
-    so that a study goes on after Ctrl-C, a kill or a new scene; scene, lighting, size, method, settings, device, driver, \
+    so that a study goes on after Ctrl-C, a kill or a new scene; scene, lighting, size, method, settings, what the scene holds, device, driver, \
     build and effort decide whether it is the same.\n\n\
     Glints are the radiance with them less that of the same view without, linear and scene-referred. The reference looks \
     at every flake in 8x8 and again in 9x9 parts of every pixel (4x4 and 5x5 with --quick), and says how far the two are \
@@ -263,7 +263,9 @@ pub struct BenchArgs {
     the reference's mean; mean ratio is over the reference's; FLIP compares the pictures as they are seen. After ± \
     stands the farther end of an interval of 95 %. The time of glints is that of a frame with them less that of the \
     same frame without, in turns in one run: processor time of the process where the device is the processor. \
-    Repeating a study changes no error, and no ratio of times by more than its printed spread.\n\n\
+    Repeating a study changes no error, and \
+    no ratio of times by more than its printed spread while the machine has nothing else to do. Where neither \
+    scenes nor methods are named, a study measures the charts of --exactness too, once.\n\n\
     --quick leaves out what takes longest on a processor: of `jakob` epsilon .5, .02 and 0, of `atanasov` 100 \
     enumerated, of `wang2018` depth 8, of `wang2020` samples 1024, and all scenes but shoe and cloth."
 )]
@@ -281,9 +283,10 @@ pub struct AccuracyArgs {
     /// distribution, from a tenth of a flake in a footprint to 100,000, for three materials.
     #[arg(long)]
     pub counts: bool,
-    /// What each exactness costs on its own, without any scene: ways to compute the probability that a flake is lit, the
-    /// number of lit flakes, and formulas in which f32 loses digits, each with its error against f64 and its nanoseconds.
-    #[arg(long)]
+    /// What each exactness costs on its own: ways to compute the probability that a flake is lit, the number of lit
+    /// flakes, the footprint, the environment, occlusion, and formulas in which f32 loses digits, each with its error and
+    /// its nanoseconds.
+    #[arg(long, conflicts_with = "method")]
     pub exactness: bool,
     /// A contact sheet of all methods on all embedded scenes but the large one.
     #[arg(long, value_name = "FILE.png")]
@@ -315,7 +318,7 @@ pub struct AccuracyArgs {
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub rounds: Option<u32>,
     /// Samples of each pixel of the sheet, averaged.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "sheet", conflicts_with = "scene", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub samples: u32,
     /// Who answers what blocks light in a study, as in `mica render`.
     #[arg(long, value_enum, default_value_t = OcclusionChoice::Auto)]

@@ -54,8 +54,7 @@ impl From<mica_gpu::Error> for Failure {
         let message = match error {
             // The library cannot know how its host lets the limit be raised.
             mica_gpu::Error::MemoryLimit { what, bytes, used, limit } => format!(
-                "out of memory: {what} needs {bytes} bytes, which with what is there makes {used}, and {limit} may be \
-                 taken; use a smaller --size or scene, or --occlusion none, or allow more with --memory"
+                "out of memory: {what} needs {bytes} bytes, {used} are taken, and no more than {limit} may be; use a smaller --size or scene, or --occlusion none, or allow more with --memory"
             ),
             error @ mica_gpu::Error::BufferRange { .. } if error.to_string().contains("buffer bvh_") => {
                 format!("{error}; --occlusion none does without it, as does ray-query on a device that offers it")

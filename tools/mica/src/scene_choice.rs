@@ -20,6 +20,22 @@ pub struct ChosenScene {
     pub scene: Scene,
 }
 
+/// Whether there is an embedded scene of that name, or else a file: known before anything else is done.
+pub fn check(choice: &Path) -> Result<(), Failure> {
+    let name = choice.display();
+    if choice.to_str().and_then(embedded_scene).is_some() || choice.exists() {
+        return Ok(());
+    }
+    if choice.extension().is_some() {
+        return Err(Failure::bad_input(format!("{name}: there is no such file; name one that is there")));
+    }
+    let known: Vec<&str> = EMBEDDED_SCENES.iter().map(|scene| scene.name).collect();
+    let known = known.join(", ");
+    Err(Failure::bad_input(format!(
+        "no scene `{name}`: embedded are {known}; or give the path of a .gltf or .glb file"
+    )))
+}
+
 /// Loads the embedded scene of that name, or else the file.
 pub fn load(choice: &Path, progress: &mut Progress) -> Result<ChosenScene, Failure> {
     let name = choice.display().to_string();
@@ -27,12 +43,8 @@ pub fn load(choice: &Path, progress: &mut Progress) -> Result<ChosenScene, Failu
         let scene = on_loader(&name, progress, || embedded.load())?;
         return Ok(ChosenScene { name, folder: None, scene });
     }
-    if choice.extension().is_none() && !choice.exists() {
-        let known: Vec<&str> = EMBEDDED_SCENES.iter().map(|scene| scene.name).collect();
-        let known = known.join(", ");
-        return Err(Failure::bad_input(format!(
-            "no scene `{name}`: embedded are {known}; or give the path of a .gltf or .glb file"
-        )));
+    if choice.extension().is_none() {
+        check(choice)?;
     }
     let path = choice.to_owned();
     let folder = path.parent().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder });

@@ -9,7 +9,7 @@ use crate::session::{cache, executor};
 use crate::study::{Lines, machine};
 use crate::table::{Column, table};
 use mica_accuracy::Machine;
-use mica_accuracy::exactness::{Chart, Effort, ExactnessError, ExactnessLine, measure};
+use mica_accuracy::exactness::{Chart, EXACTNESS_SCHEMA, Effort, ExactnessError, ExactnessLine, measure};
 use mica_gpu::{Device, DeviceOptions};
 use std::path::Path;
 
@@ -62,7 +62,9 @@ pub fn exactness(
 fn open(folder: &Path) -> Result<Lines<ExactnessLine>, Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Failure::bad_input(format!("{}: {error}; name a folder", folder.display())))?;
-    Lines::open(&folder.join(FILE))
+    let mut lines = Lines::<ExactnessLine>::open(&folder.join(FILE))?;
+    lines.all.retain(|line| line.schema == EXACTNESS_SCHEMA);
+    Ok(lines)
 }
 
 impl From<ExactnessError> for Failure {

@@ -30,7 +30,9 @@ pub fn accuracy(args: &AccuracyArgs) -> Result<(), Failure> {
     if let Some(folder) = args.output.as_deref().filter(|_| is_study) {
         let mut folder = Folder::open(folder)?;
         let points = study::study(args, &mut folder, &methods, &interrupt, &mut progress);
-        let charts = points.as_ref().map_or(Ok(()), |()| exactness::exactness(args, false, &interrupt, &mut progress));
+        // Who asks for certain methods or scenes asks for nothing else.
+        let whole = args.scene.is_empty() && args.method.is_empty() && points.is_ok();
+        let charts = if whole { exactness::exactness(args, false, &interrupt, &mut progress) } else { Ok(()) };
         // What was measured is shown, whatever became of the rest.
         let drawn = if folder.points.all.is_empty() { Ok(()) } else { draw(args, &folder.path) };
         return points.and(charts).and(drawn);

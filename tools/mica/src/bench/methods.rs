@@ -6,6 +6,7 @@ use crate::error::{Failure, INTERRUPTED};
 use crate::interrupt::Interrupt;
 use crate::output;
 use crate::progress::Progress;
+use crate::scene_choice;
 use crate::study::{Effort, Lines, OpenPlace, Stop, measure, rungs, stops, table_of, unmeasured};
 use mica_accuracy::Point;
 use mica_render::{MethodInfo, Rung};
@@ -22,8 +23,16 @@ pub fn methods(args: &BenchArgs) -> Result<(), Failure> {
     let methods = chosen(&args.method)?;
     let interrupt = Interrupt::new()?;
     let to_stdout = args.json.as_deref() == Some(Path::new("-"));
-    let lines = args.json.as_deref().filter(|_| !to_stdout).map(Lines::open).transpose()?;
+    let lines = args.json.as_deref().filter(|_| !to_stdout).map(Lines::of_points).transpose()?;
+    if let (Some(lines), Some(path)) = (&lines, &args.json)
+        && lines.all.is_empty()
+        && lines.passed_over > 0
+    {
+        let path = path.display();
+        return Err(Failure::bad_input(format!("--json {path}: it holds no points of a bench; name another file")));
+    }
     let scenes = if args.scene.is_empty() { vec![PathBuf::from(DEFAULT_SCENE)] } else { args.scene.clone() };
+    scenes.iter().try_for_each(|scene| scene_choice::check(scene))?;
     let sizes = if args.size.is_empty() { vec![DEFAULT_SIZE] } else { args.size.clone() };
     let mut bench = Bench {
         args,
@@ -119,12 +128,13 @@ impl Bench<'_> {
     }
 
     fn keep(&mut self, point: Point) -> Result<(), Failure> {
-        self.measured += 1;
         if self.to_stdout {
             let line = serde_json::to_string(&point).map_err(|error| Failure::bad_input(error.to_string()))?;
             output::print(&(line + "\n"))?;
         }
-        self.lines.as_mut().map_or(Ok(()), |lines| lines.add(point))
+        self.lines.as_mut().map_or(Ok(()), |lines| lines.add(point))?;
+        self.measured += 1;
+        Ok(())
     }
 
     fn show(&mut self, points: &[Point]) -> Result<(), Failure> {

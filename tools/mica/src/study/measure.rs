@@ -63,6 +63,7 @@ pub fn unmeasured(open: &OpenPlace, method: &MethodInfo, rung: &Rung, effort: &s
         claim: method.claim.name().to_owned(),
         machine: open.machine.clone(),
         effort: effort.to_owned(),
+        content: open.content.clone(),
         command: format!("mica render {scene}{} --method {}{settings} -o point.png", open.options, method.name),
         errors: None,
         cost: super::timing::nothing_yet(),

@@ -58,6 +58,8 @@ pub struct OpenPlace {
     pub machine: Machine,
     /// The scene on the device.
     pub session: Session,
+    /// Letters that change with anything that is seen of the scene and its environment.
+    pub content: String,
     /// The options of `mica render` that show the place, ready to follow its name.
     pub options: String,
     /// The glinting materials as the scene has them.
@@ -83,7 +85,9 @@ impl OpenPlace {
     ) -> Result<Self, Failure> {
         let mut args = args.clone();
         lighting.apply(&mut args);
-        let session = Session::of(Loaded::new(&args, progress)?, &args, earlier)?;
+        let loaded = Loaded::new(&args, progress)?;
+        let content = loaded.fingerprint();
+        let session = Session::of(loaded, &args, earlier)?;
         if lighting == Lighting::Lights && session.renderer.scene().lights.is_empty() {
             let scene = &session.scene;
             return Err(Failure::bad_input(format!("{scene} has no lights; leave out --lighting lights for it")));
@@ -94,7 +98,7 @@ impl OpenPlace {
             options += &format!(" --occlusion {}", session.renderer.occlusion().name());
         }
         let place = Place { scene: session.scene.clone(), lighting: lighting.name().to_owned(), size: args.size };
-        Self::of_session(session, place, options)
+        Ok(Self { content, ..Self::of_session(session, place, options)? })
     }
 
     /// The same of a session that is there already and has shown no glints yet.
@@ -113,7 +117,16 @@ impl OpenPlace {
         let view = mica_render::View { glints: false, ..session.view.clone() };
         session.look(&view, Timing::Overlapped, Wanted::default())?;
         let without_glints = session.executor.memory().into_iter().map(|row| row.name).collect();
-        let mut open = Self { place, machine, session, options, own, without_glints, built: BTreeSet::new() };
+        let mut open = Self {
+            place,
+            machine,
+            session,
+            content: String::new(),
+            options,
+            own,
+            without_glints,
+            built: BTreeSet::new(),
+        };
         open.reset()?;
         Ok(open)
     }

@@ -124,6 +124,7 @@ impl Reference {
             place: open.place.clone(),
             machine: open.machine.clone(),
             effort: effort.of_reference(),
+            content: open.content.clone(),
             samples: a * a + b * b,
             noise: joined.noise,
             floor,

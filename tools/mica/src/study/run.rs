@@ -13,6 +13,7 @@ use crate::error::{Failure, INTERRUPTED};
 use crate::interrupt::Interrupt;
 use crate::output;
 use crate::progress::Progress;
+use crate::scene_choice;
 use mica_accuracy::Point;
 use mica_gpu::Executor;
 use mica_render::{MethodInfo, Rung};
@@ -28,6 +29,7 @@ pub fn study(
     let scenes = if args.scene.is_empty() { plan::scenes(args.quick) } else { args.scene.clone() };
     let default_size = if args.quick { [320, 180] } else { [640, 360] };
     let sizes = if args.size.is_empty() { vec![default_size] } else { args.size.clone() };
+    scenes.iter().try_for_each(|scene| scene_choice::check(scene))?;
     let stops = plan::stops(&scenes, &sizes, &args.lighting);
     let effort = effort(args);
     interrupt.defer();
@@ -131,7 +133,15 @@ impl Run<'_> {
             *next += 1;
             let wanted = unmeasured(&open, method, rung, &self.effort.describe());
             // The last of several lines counts, here as in the report.
-            if let Some(point) = self.folder.points.all.iter().rev().find(|point| point.is_same_as(&wanted)) {
+            if let Some(point) = self
+                .folder
+                .points
+                .all
+                .iter()
+                .rev()
+                .find(|point| point.is_same_as(&wanted))
+                .filter(|point| self.folder.has_pictures(point))
+            {
                 shown.push(point.clone());
                 continue;
             }

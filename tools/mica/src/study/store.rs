@@ -4,7 +4,7 @@ use super::place::OpenPlace;
 use super::{Effort, Reference, ReferencePixels, reference_file};
 use crate::error::Failure;
 use crate::output::Destination;
-use mica_accuracy::{Machine, Place, Point, ReferenceLine};
+use mica_accuracy::{POINT_SCHEMA, Place, Point, REFERENCE_SCHEMA, ReferenceLine};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -17,6 +17,20 @@ pub struct Lines<T> {
     file: File,
     /// All lines, those of earlier runs first.
     pub all: Vec<T>,
+    /// Lines that are something else.
+    pub passed_over: usize,
+}
+
+impl Lines<Point> {
+    /// Opens or makes a file of points; lines of an older form are passed over.
+    ///
+    /// # Errors
+    /// Those of [`Lines::open`].
+    pub fn of_points(path: &Path) -> Result<Self, Failure> {
+        let mut lines = Self::open(path)?;
+        lines.all.retain(|point| point.schema == POINT_SCHEMA);
+        Ok(lines)
+    }
 }
 
 impl<T: Serialize + DeserializeOwned> Lines<T> {
@@ -26,7 +40,10 @@ impl<T: Serialize + DeserializeOwned> Lines<T> {
     /// # Errors
     /// If the file cannot be read and written, or another process has it.
     pub fn open(path: &Path) -> Result<Self, Failure> {
-        let failed = |error: std::io::Error| Failure::bad_input(format!("{}: {error}", path.display()));
+        let failed = |error: std::io::Error| {
+            let what_to_do = "name a file that can be written, in a folder that is there";
+            Failure::bad_input(format!("{}: {error}; {what_to_do}", path.display()))
+        };
         let mut file =
             OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
         match file.try_lock() {
@@ -47,15 +64,18 @@ impl<T: Serialize + DeserializeOwned> Lines<T> {
             file.set_len(whole as u64).map_err(failed)?;
         }
         file.seek(SeekFrom::End(0)).map_err(failed)?;
-        let mut all = Vec::new();
+        let (mut all, mut passed_over) = (Vec::new(), 0);
         for (index, line) in bytes[..whole].split(|byte| *byte == b'\n').enumerate() {
             match serde_json::from_slice(line) {
                 Ok(line) => all.push(line),
                 Err(_) if line.iter().all(u8::is_ascii_whitespace) => {}
-                Err(error) => log::warn!("{}, line {}: {error}; it is passed over", path.display(), index + 1),
+                Err(error) => {
+                    passed_over += 1;
+                    log::warn!("{}, line {}: {error}; it is passed over", path.display(), index + 1);
+                }
             }
         }
-        Ok(Self { path: path.to_owned(), file, all })
+        Ok(Self { path: path.to_owned(), file, all, passed_over })
     }
 
     /// Appends a line, which is on its way to the disk before this returns.
@@ -91,8 +111,16 @@ impl Folder {
                 .map_err(|error| Failure::bad_input(format!("{}: {error}; name a folder", folder.display())))?;
         }
         // The points' lock is the folder's.
-        let points = Lines::open(&path.join("points.jsonl"))?;
-        Ok(Self { path: path.to_owned(), points, references: Lines::open(&path.join("references.jsonl"))? })
+        let points = Lines::of_points(&path.join("points.jsonl"))?;
+        let mut references = Lines::<ReferenceLine>::open(&path.join("references.jsonl"))?;
+        references.all.retain(|line| line.schema == REFERENCE_SCHEMA);
+        Ok(Self { path: path.to_owned(), points, references })
+    }
+
+    /// Whether the files that a point names are there.
+    pub fn has_pictures(&self, point: &Point) -> bool {
+        let is_there = |name: &String| fs::metadata(self.path.join(name)).is_ok_and(|file| file.len() > 0);
+        point.pictures.iter().flatten().all(is_there)
     }
 
     /// Writes a file that other files refer to by this name.
@@ -103,11 +131,12 @@ impl Folder {
     /// The reference of a place, if one was kept that this machine rendered with this effort.
     pub fn reference(&self, open: &OpenPlace, effort: &Effort) -> Option<(ReferenceLine, ReferencePixels)> {
         let is_same = |line: &&ReferenceLine| {
-            line.place == open.place && line.machine == open.machine && line.effort == effort.of_reference()
+            let same = line.place == open.place && line.machine == open.machine && line.content == open.content;
+            same && line.effort == effort.of_reference()
         };
         let line = self.references.all.iter().rev().find(is_same)?;
         let bytes = fs::read(self.path.join(&line.pictures[1])).ok()?;
-        let pixels = reference_file::read(&bytes, &of(&line.place, &line.machine, &line.effort))?;
+        let pixels = reference_file::read(&bytes, &of(line))?;
         Some((line.clone(), pixels))
     }
 
@@ -116,15 +145,15 @@ impl Folder {
         let Reference { line, pixels, .. } = reference;
         let shown = mica_accuracy::displayed(&pixels.whole, exposure);
         self.write(&line.pictures[0], &crate::picture::png_of(&shown, pixels.size)?)?;
-        let bytes = reference_file::write(pixels, &of(&line.place, &line.machine, &line.effort))?;
+        let bytes = reference_file::write(pixels, &of(line))?;
         self.write(&line.pictures[1], &bytes)?;
         self.references.add(line.clone())
     }
 }
 
 /// Whose reference a file is.
-fn of(place: &Place, machine: &Machine, effort: &str) -> String {
-    format!("{place:?} {machine:?} {effort}")
+fn of(ReferenceLine { place, machine, effort, content, .. }: &ReferenceLine) -> String {
+    format!("{place:?} {machine:?} {effort} {content}")
 }
 
 /// The names of a reference's picture and .exr.

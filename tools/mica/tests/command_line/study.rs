@@ -107,6 +107,39 @@ fn a_study_goes_on_where_it_ended_and_comes_out_the_same() {
     }
 }
 
+/// The scene of a file is what it holds, not its name; a point is kept while its pictures are, and its line is of this form.
+#[test]
+fn what_changed_or_is_lost_is_measured_again_and_nothing_else() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scene = folder.path().join("scene.glb");
+    let made = folder.path().join("made");
+    let embedded = |name: &str| {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../assets/scenes/{name}.glb"));
+        std::fs::copy(path, &scene).expect("copied");
+    };
+    let measured = || {
+        let paths = [&made, &scene].map(|path| path.to_str().expect("a plain name"));
+        let again = ["--quick", "--size", "16x9", "--seconds", "0", "--method", "smooth", "--rounds", "2"];
+        succeeded(run(&[&["accuracy", "-o", paths[0], paths[1]], &again[..]].concat()))
+    };
+    embedded("sphere");
+    assert!(measured().contains("1 points measured, 1 in all"));
+    assert!(measured().contains("0 points measured, 1 in all"));
+    embedded("cloth");
+    assert!(measured().contains("1 points measured, 2 in all"));
+
+    let points = lines(&made, "points.jsonl");
+    let [before, after] = [0, 1].map(|k| (points[k]["content"].to_string(), points[k]["errors"].to_string()));
+    assert!(before.0 != after.0 && before.1 != after.1, "{points:?}");
+    std::fs::remove_file(made.join(points[1]["pictures"][0].as_str().expect("a path"))).expect("it was there");
+    assert!(measured().contains("1 points measured, 3 in all"));
+
+    let file = made.join("points.jsonl");
+    let older = std::fs::read_to_string(&file).expect("lines").replace("mica-point-1", "mica-point-0");
+    std::fs::write(&file, older).expect("written");
+    assert!(measured().contains("1 points measured, 1 in all"));
+}
+
 #[test]
 fn an_interrupt_keeps_what_is_finished_and_a_second_process_waits_outside() {
     let folder = tempfile::tempdir().expect("a temporary folder");
