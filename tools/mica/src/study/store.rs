@@ -59,22 +59,28 @@ impl<T: Serialize + DeserializeOwned> Lines<T> {
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(failed)?;
         let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
+        if bytes.get(whole).is_some_and(|byte| *byte != b'{') {
+            let path = path.display();
+            return Err(Failure::bad_input(format!("{path}: it does not end in a line of JSON; name another file")));
+        }
         if whole < bytes.len() {
             log::info!("{}: the last line was cut short and is taken off", path.display());
             file.set_len(whole as u64).map_err(failed)?;
         }
         file.seek(SeekFrom::End(0)).map_err(failed)?;
-        let (mut all, mut passed_over) = (Vec::new(), 0);
+        let (mut all, mut passed_over) = (Vec::new(), Vec::new());
         for (index, line) in bytes[..whole].split(|byte| *byte == b'\n').enumerate() {
             match serde_json::from_slice(line) {
                 Ok(line) => all.push(line),
                 Err(_) if line.iter().all(u8::is_ascii_whitespace) => {}
                 Err(error) => {
-                    passed_over += 1;
-                    log::warn!("{}, line {}: {error}; it is passed over", path.display(), index + 1);
+                    passed_over.push(format!("{}, line {}: {error}; it is passed over", path.display(), index + 1));
                 }
             }
         }
+        // Of a file that has no line of this kind its reader says so, once.
+        passed_over.iter().filter(|_| !all.is_empty()).for_each(|why| log::warn!("{why}"));
+        let passed_over = passed_over.len();
         Ok(Self { path: path.to_owned(), file, all, passed_over })
     }
 

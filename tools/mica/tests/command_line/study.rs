@@ -197,11 +197,13 @@ fn a_bench_times_methods_and_goes_on_in_its_file() {
 fn a_place_that_cannot_be_measured_is_said_and_the_others_go_on() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = in_folder(folder.path(), "bench.jsonl");
-    // The sphere has no lights, and the file does not exist.
+    // The sphere has no lights, and the file is no scene.
+    let broken = in_folder(folder.path(), "none.glb");
+    std::fs::write(&broken, "x").expect("written");
     let output = run(&[
         "bench",
         "sphere",
-        "none.glb",
+        &broken,
         "--size",
         "24x18",
         "--method",
@@ -228,6 +230,8 @@ fn what_cannot_be_studied_is_refused_in_one_line() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = in_folder(folder.path(), "file");
     std::fs::write(&file, "x").expect("a file");
+    let prose = in_folder(folder.path(), "prose");
+    std::fs::write(&prose, "not JSON\n").expect("a file");
     let inside = in_folder(folder.path(), "file/study");
     let fine = in_folder(folder.path(), "study");
     for (arguments, part) in [
@@ -240,6 +244,10 @@ fn what_cannot_be_studied_is_refused_in_one_line() {
         (&["accuracy", "-o", &fine, "plane", "--method", "magic"], "magic"),
         (&["accuracy", "--counts", "plane"], "--counts"),
         (&["bench", "plane", "--method", "magic"], "magic"),
+        (&["bench", "plane", "none.glb"], "no such file"),
+        (&["accuracy", "-o", &fine, "plane", "nowhere"], "embedded are"),
+        (&["bench", "plane", "--json", &file], "another file"),
+        (&["bench", "plane", "--json", &prose], "another file"),
         (&["bench", "plane", "--rays", "7"], "--occlusion"),
         (&["bench", "plane", "--json", &inside], "file/study"),
         (&["bench", "--occlusion", "--size", "8x8", "--size", "9x9"], "one --size"),
@@ -247,4 +255,5 @@ fn what_cannot_be_studied_is_refused_in_one_line() {
         let error = failed_in_one_line(&run(arguments), 2);
         assert!(error.contains(part), "{error}");
     }
+    assert_eq!(std::fs::read_to_string(&file).expect("it is there"), "x");
 }
