@@ -169,6 +169,7 @@ mod tests {
                 build: "build".to_owned(),
             },
             effort: "little".to_owned(),
+            content: String::new(),
             command: "mica render plane".to_owned(),
             errors,
             cost: Cost {
