@@ -193,8 +193,7 @@ pub struct ExplainArgs {
     after_long_help = "Without --occlusion, every method with every rung of its ladder (see `mica methods`) at every scene, size and \
     lighting. The time of glints is that of a frame with them less that of the same frame without, in turns in one \
     run: processor time of the process where the device is the processor, timestamps of the device elsewhere. Figures \
-    are medians over the rounds; after ± stands the farther of least and greatest, which is at least what two runs of \
-    the program differ by. Tables are those a method makes anew when a setting changes, without the compilation of \
+    are medians over the rounds; after ± stands the farther of least and greatest, and no less than 5 % of the frame. Tables are those a method makes anew when a setting changes, without the compilation of \
     shaders."
 )]
 pub struct BenchArgs {
@@ -263,8 +262,9 @@ pub struct BenchArgs {
     the reference's mean; mean ratio is over the reference's; FLIP compares the pictures as they are seen. After ± \
     stands the farther end of an interval of 95 %. The time of glints is that of a frame with them less that of the \
     same frame without, in turns in one run: processor time of the process where the device is the processor. \
-    Repeating a study changes no error, and \
-    no ratio of times by more than its printed spread while the machine has nothing else to do. Where neither \
+    Repeating a study changes no error. \
+    Ratios of times may move by more than their spread where others use the processor too: compare runs on a quiet \
+    machine. Where neither \
     scenes nor methods are named, a study measures the charts of --exactness too, once.\n\n\
     --quick leaves out what takes longest on a processor: of `jakob` epsilon .5, .02 and 0, of `atanasov` 100 \
     enumerated, of `wang2018` depth 8, of `wang2020` samples 1024, and all scenes but shoe and cloth."
