@@ -174,7 +174,7 @@ mod tests {
             errors,
             cost: Cost {
                 clock: "gpu".to_owned(),
-                rounds: 3,
+                sittings: vec![vec![[2e7, 1e7]; 3]],
                 glints,
                 frame: of(20.0 * MS),
                 ratio: of(1.1),

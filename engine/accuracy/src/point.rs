@@ -11,7 +11,7 @@ pub const POINT_SCHEMA: &str = "mica-point-1";
 /// What lines of references say of themselves.
 pub const REFERENCE_SCHEMA: &str = "mica-reference-1";
 
-/// A figure and how sure it is: an error with its interval of 95 %, or the median of times with the least and greatest.
+/// A figure and how sure it is: an error with its interval of 95 %, or the median of times with their spread.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The figure; not a number, and `null` in JSON, where it is not defined, as a ratio to nothing.
@@ -70,8 +70,9 @@ pub struct Bytes {
 pub struct Cost {
     /// `gpu` (timestamps) or `cpu` (processor time of the process, where the device is the processor).
     pub clock: String,
-    /// Rounds, each a frame with glints and one without.
-    pub rounds: u32,
+    /// What the figures are made of: the sittings, which lie apart in time, each with its rounds, each round the nanoseconds
+    /// of a frame with glints and of one without.
+    pub sittings: Vec<Vec<[f64; 2]>>,
     /// Overlapped frame with glints less overlapped frame without, paired in each round. May be below 0 within its spread.
     pub glints: Estimate,
     /// The overlapped frame with glints.

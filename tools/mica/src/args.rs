@@ -193,7 +193,8 @@ pub struct ExplainArgs {
     after_long_help = "Without --occlusion, every method with every rung of its ladder (see `mica methods`) at every scene, size and \
     lighting. The time of glints is that of a frame with them less that of the same frame without, in turns in one \
     run: processor time of the process where the device is the processor, timestamps of the device elsewhere. Figures \
-    are medians over the rounds; after ± stands the farther of least and greatest, and no less than 5 % of the frame. Tables are those a method makes anew when a setting changes, without the compilation of \
+    are medians over the rounds of three sittings, between which all other points of the place are timed; after ± stands what rounds and \
+    sittings differ by, and no less than 5 % of the frame. Tables are those a method makes anew when a setting changes, without the compilation of \
     shaders."
 )]
 pub struct BenchArgs {
@@ -218,7 +219,8 @@ pub struct BenchArgs {
     /// With --occlusion: rays from what the camera sees, into all directions, and as many at most towards the first light.
     #[arg(long, value_name = "N", default_value_t = 1 << 18, value_parser = clap::value_parser!(u32).range(1..), requires = "occlusion", conflicts_with_all = ["method", "lighting", "paper"])]
     pub rays: u32,
-    /// Rounds that are measured, after those that warm up: fewer, but at least two, where they take more than 20 seconds.
+    /// Rounds of a sitting, of which there are three, after frames that warm up: fewer, but at least two, where they take
+    /// more than 7 seconds.
     /// With --occlusion all of them, and each builds everything anew.
     #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub rounds: u32,
@@ -263,8 +265,8 @@ pub struct BenchArgs {
     stands the farther end of an interval of 95 %. The time of glints is that of a frame with them less that of the \
     same frame without, in turns in one run: processor time of the process where the device is the processor. \
     Repeating a study changes no error. \
-    Ratios of times may move by more than their spread where others use the processor too: compare runs on a quiet \
-    machine. Where neither \
+    Each point is timed in three sittings, between which all others of the place are, so that a spread tells what \
+    another run may find. Where neither \
     scenes nor methods are named, a study measures the charts of --exactness too, once.\n\n\
     --quick leaves out what takes longest on a processor: of `jakob` epsilon .5, .02 and 0, of `atanasov` 100 \
     enumerated, of `wang2018` depth 8, of `wang2020` samples 1024, and all scenes but shoe and cloth."
@@ -310,11 +312,11 @@ pub struct AccuracyArgs {
     /// its `environment` without the lights.
     #[arg(long, value_enum, default_values_t = [Lighting::Own])]
     pub lighting: Vec<Lighting>,
-    /// Seconds that the rounds of a point may take, as far as the fewest (5, with --quick 3) fit into them. Default: 20,
-    /// with --quick 0.8.
+    /// Seconds that the rounds of a point may take in each of three sittings, as far as the fewest (2, with --quick 1) fit
+    /// into them. Default: 7, with --quick 0.4.
     #[arg(long, value_name = "S", value_parser = seconds, allow_hyphen_values = true)]
     pub seconds: Option<f64>,
-    /// Most rounds of a frame with glints and one without. Default: 15, with --quick 5.
+    /// Most rounds of a sitting, each a frame with glints and one without. Default: 5, with --quick 3.
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub rounds: Option<u32>,
     /// Samples of each pixel of the sheet, averaged.

@@ -7,7 +7,7 @@ use crate::interrupt::Interrupt;
 use crate::output;
 use crate::progress::Progress;
 use crate::scene_choice;
-use crate::study::{Effort, Lines, OpenPlace, Stop, measure, rungs, stops, table_of, unmeasured};
+use crate::study::{Effort, Lines, OpenPlace, Stop, measure, rungs, sit_again, stops, table_of, unmeasured};
 use mica_accuracy::Point;
 use mica_render::{MethodInfo, Rung};
 use std::path::{Path, PathBuf};
@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 /// What is measured where nobody says.
 const DEFAULT_SCENE: &str = "shoe";
 const DEFAULT_SIZE: [u32; 2] = [640, 360];
-/// Seconds that the rounds of a point may take, if there are two at least.
-const SECONDS: f64 = 20.0;
+/// Seconds that the rounds of a sitting may take, if there are two at least.
+const SECONDS: f64 = 7.0;
 
 /// Measures, writes and prints. What was measured before Ctrl-C or a failure is kept.
 pub fn methods(args: &BenchArgs) -> Result<(), Failure> {
@@ -100,7 +100,7 @@ impl Bench<'_> {
             };
             let wanted = unmeasured(place, method, rung, &self.effort.of_times());
             let all = self.lines.as_ref().map_or(&[][..], |lines| &lines.all);
-            if let Some(point) = all.iter().rev().find(|point| point.is_same_as(&wanted)) {
+            if let Some(point) = all.iter().find(|point| point.is_same_as(&wanted)) {
                 points.push(point.clone());
                 continue;
             }
@@ -119,6 +119,14 @@ impl Bench<'_> {
                 }
             }
         }
+        if let Some(place) = &mut open {
+            let (lines, around) = (&mut self.lines, (self.interrupt, &mut self.progress));
+            let keep = |point: &Point| lines.as_mut().map_or(Ok(()), |lines| lines.renew(point.clone()));
+            match sit_again(place, &mut points, &self.effort, around, keep) {
+                Err(failure) if failure.code != INTERRUPTED => self.report(&stop.scene.display().to_string(), failure),
+                _ => {}
+            }
+        }
         self.show(&points)?;
         if self.interrupt.requested() {
             let message = format!("interrupted after {} points, which were kept", self.measured);
@@ -128,18 +136,20 @@ impl Bench<'_> {
     }
 
     fn keep(&mut self, point: Point) -> Result<(), Failure> {
-        if self.to_stdout {
-            let line = serde_json::to_string(&point).map_err(|error| Failure::bad_input(error.to_string()))?;
-            output::print(&(line + "\n"))?;
-        }
-        self.lines.as_mut().map_or(Ok(()), |lines| lines.add(point))?;
+        self.lines.as_mut().map_or(Ok(()), |lines| lines.renew(point))?;
         self.measured += 1;
         Ok(())
     }
 
     fn show(&mut self, points: &[Point]) -> Result<(), Failure> {
         self.progress.clear();
-        if self.args.quiet || self.to_stdout { Ok(()) } else { output::print(&table_of(points)) }
+        if self.to_stdout {
+            let failed = |error: serde_json::Error| Failure::bad_input(error.to_string());
+            return points
+                .iter()
+                .try_for_each(|point| output::print(&(serde_json::to_string(point).map_err(failed)? + "\n")));
+        }
+        if self.args.quiet { Ok(()) } else { output::print(&table_of(points)) }
     }
 
     fn report(&mut self, what: &str, failure: Failure) {

@@ -186,7 +186,8 @@ impl Numbers {
 /// Measures, writes and prints; what was measured before Ctrl-C or a failure is kept.
 pub fn wdh20(args: &BenchArgs) -> Result<(), Failure> {
     let size = args.size.last().copied().unwrap_or(THEIR_SIZE);
-    let effort = &Effort { path_frames: 0, rounds: [2, args.rounds.max(2)], isolated: 3, ..Effort::quick() };
+    let effort =
+        &Effort { path_frames: 0, sittings: 1, rounds: [2, args.rounds.max(2)], isolated: 3, ..Effort::quick() };
     let scenes = scenes(&args.scene)?;
     let mut numbers = Numbers::create(args.json.as_deref())?;
     let interrupt = Interrupt::new()?;

@@ -124,7 +124,6 @@ impl<'a> Measuring<'a> {
             let mut point = study::unmeasured(&open, method, rung, &self.effort.of_times());
             point.cost.glints = Estimate::exact(ns);
             point.cost.frame = Estimate::exact(ns + without_ns);
-            point.cost.rounds = 1;
             point
         } else {
             self.prepare_reference(&mut open)?;

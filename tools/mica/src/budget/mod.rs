@@ -75,7 +75,7 @@ pub fn choose_for(
 fn effort(metric: Metric) -> Effort {
     let quick = Effort::quick();
     let path_frames = if metric == Metric::Flicker { quick.path_frames } else { 0 };
-    Effort { path_frames, seconds: 1.0, rounds: [3, 8], isolated: 1, ..quick }
+    Effort { path_frames, sittings: 1, seconds: 1.0, rounds: [3, 8], isolated: 1, ..quick }
 }
 
 /// All rungs of one method or of all: those first that claim little, as they are cheap.

@@ -98,7 +98,7 @@ pub fn further(point: &Point) -> [(&'static str, String); 4] {
     [
         ("precomputation, ms", three_digits(point.cost.precomputation * MS)),
         ("memory of glints", bytes(point.cost.glint_bytes)),
-        ("rounds", point.cost.rounds.to_string()),
+        ("rounds", point.cost.sittings.iter().map(Vec::len).sum::<usize>().to_string()),
         ("clock", point.cost.clock.clone()),
     ]
 }

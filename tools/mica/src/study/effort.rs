@@ -10,9 +10,12 @@ pub struct Effort {
     pub path_frames: u32,
     /// Parts along each side of a pixel in the reference's own path.
     pub path_parts: u32,
-    /// Seconds that the rounds of a point may take together, as far as the fewest rounds fit into them.
+    /// How often a point is timed, with all others of its place in between: times of one sitting are more alike than those
+    /// of two.
+    pub sittings: usize,
+    /// Seconds that the rounds of a sitting may take together, as far as the fewest rounds fit into them.
     pub seconds: f64,
-    /// Fewest and most rounds of a frame with glints and one without.
+    /// Fewest and most rounds of a sitting, each a frame with glints and one without.
     pub rounds: [u32; 2],
     /// Frames whose passes are timed in isolation.
     pub isolated: u32,
@@ -21,12 +24,12 @@ pub struct Effort {
 impl Effort {
     /// For minutes.
     pub fn quick() -> Self {
-        Self { parts: [4, 5], path_frames: 3, path_parts: 2, seconds: 0.8, rounds: [3, 5], isolated: 1 }
+        Self { parts: [4, 5], path_frames: 3, path_parts: 2, sittings: 3, seconds: 0.4, rounds: [1, 3], isolated: 1 }
     }
 
     /// For hours.
     pub fn full() -> Self {
-        Self { parts: [8, 9], path_frames: 16, path_parts: 4, seconds: 20.0, rounds: [5, 15], isolated: 3 }
+        Self { parts: [8, 9], path_frames: 16, path_parts: 4, sittings: 3, seconds: 7.0, rounds: [2, 5], isolated: 3 }
     }
 
     /// Words that go into every line: figures of another effort are others.
@@ -36,8 +39,8 @@ impl Effort {
 
     /// The part of it that decides how times are taken.
     pub fn of_times(&self) -> String {
-        let Self { seconds, rounds: [fewest, most], isolated, .. } = self;
-        format!("{fewest} to {most} rounds within {seconds} s, {isolated} isolated")
+        let Self { sittings, seconds, rounds: [fewest, most], isolated, .. } = self;
+        format!("{sittings} sittings of {fewest} to {most} rounds within {seconds} s, {isolated} isolated")
     }
 
     /// The part of it that decides what a reference is.
@@ -62,6 +65,7 @@ mod tests {
         let of_times = [
             Effort { seconds: 1.0, ..quick.clone() },
             Effort { rounds: [2, 7], ..quick.clone() },
+            Effort { sittings: 1, ..quick.clone() },
             Effort { isolated: 2, ..quick.clone() },
         ];
         assert!(of_reference.iter().chain(&of_times).all(|other| other.describe() != quick.describe()));

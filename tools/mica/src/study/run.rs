@@ -6,6 +6,7 @@ use super::measure::{measure, unmeasured};
 use super::place::OpenPlace;
 use super::plan::{self, Stop};
 use super::reference::Reference;
+use super::sittings::sit_again;
 use super::store::{picture_names, reference_names};
 use super::tables;
 use crate::args::{AccuracyArgs, SceneArgs};
@@ -94,7 +95,7 @@ impl Run<'_> {
     fn stop(&mut self, stop: &Stop) -> Result<(), Failure> {
         let mut next = 0;
         let mut shown = Vec::new();
-        while next < self.rungs.len() {
+        loop {
             // After a failure the place is opened anew, as frames may be lost with it.
             match self.stop_from(stop, &mut next, &mut shown) {
                 Ok(()) => break,
@@ -132,16 +133,8 @@ impl Run<'_> {
             self.check_interrupt()?;
             *next += 1;
             let wanted = unmeasured(&open, method, rung, &self.effort.describe());
-            // The last of several lines counts, here as in the report.
-            if let Some(point) = self
-                .folder
-                .points
-                .all
-                .iter()
-                .rev()
-                .find(|point| point.is_same_as(&wanted))
-                .filter(|point| self.folder.has_pictures(point))
-            {
+            let known = self.folder.points.all.iter().find(|point| point.is_same_as(&wanted));
+            if let Some(point) = known.filter(|point| self.folder.has_pictures(point)) {
                 shown.push(point.clone());
                 continue;
             }
@@ -166,10 +159,16 @@ impl Run<'_> {
                 }
                 point.pictures = Some(names);
             }
-            self.folder.points.add(point.clone()).map_err(Stopped::For)?;
+            self.folder.points.renew(point.clone()).map_err(Stopped::For)?;
             self.measured += 1;
             shown.push(point);
         }
+        let (folder, around) = (&mut *self.folder, (self.interrupt, &mut *self.progress));
+        sit_again(&mut open, shown, self.effort, around, |point| folder.points.renew(point.clone())).map_err(
+            |failure| {
+                if failure.code == INTERRUPTED { Stopped::For(failure) } else { Stopped::Place(failure) }
+            },
+        )?;
         self.executor = Some(open.session.into_executor());
         Ok(())
     }

@@ -28,8 +28,24 @@ impl Lines<Point> {
     /// Those of [`Lines::open`].
     pub fn of_points(path: &Path) -> Result<Self, Failure> {
         let mut lines = Self::open(path)?;
-        lines.all.retain(|point| point.schema == POINT_SCHEMA);
+        let read = std::mem::take(&mut lines.all);
+        read.into_iter().filter(|point| point.schema == POINT_SCHEMA).for_each(|point| lines.hold(point));
         Ok(lines)
+    }
+
+    /// Appends the line of a point, which counts from now on in place of an earlier one of the same point.
+    ///
+    /// # Errors
+    /// Those of [`Lines::add`].
+    pub fn renew(&mut self, point: Point) -> Result<(), Failure> {
+        self.add(point)?;
+        self.all.pop().into_iter().for_each(|point| self.hold(point));
+        Ok(())
+    }
+
+    fn hold(&mut self, point: Point) {
+        self.all.retain(|earlier| !earlier.is_same_as(&point));
+        self.all.push(point);
     }
 }
 

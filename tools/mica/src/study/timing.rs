@@ -4,6 +4,7 @@
 
 use super::effort::Effort;
 use super::place::OpenPlace;
+use super::sittings::{Drift, settle};
 use crate::error::{Failure, INTERRUPTED, NO_DEVICE};
 use crate::interrupt::Interrupt;
 use crate::measure::{self, PassSum};
@@ -14,10 +15,6 @@ use mica_graph::{Lifetime, Plan};
 use mica_render::View;
 use std::collections::BTreeSet;
 use std::time::Instant;
-
-/// By how much a median of frame times may move from one run of the program to the next, over the frame: least half width
-/// of every spread, on a device that has nothing else to do ([`Clock::stretch`]).
-const RUN_TO_RUN: f64 = 0.05;
 
 /// Where times of frames come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,81 +61,72 @@ impl Clock {
         let missing = || Failure::with_code(NO_DEVICE, "the device gave no time for a frame; run again");
         ns.map(|ns| ns as f64).ok_or_else(missing)
     }
-
-    /// How many times as long a frame lasts as its work takes, at least 1. A processor that others use as well lets frames
-    /// wait, and what they find in its caches then is others': even processor time is worth less the longer they do.
-    fn stretch(self, run: &Run) -> f64 {
-        match (self, run.frame_ns, run.cpu_ns) {
-            (Self::Cpu, Some(lasted), Some(worked)) if worked > 0 => (lasted as f64 / worked as f64).max(1.0),
-            _ => 1.0,
-        }
-    }
 }
 
-/// Builds the tables of the method in use and times its frames. The method and its settings are those of the place as it
-/// stands ([`OpenPlace::set`]).
+/// Builds the tables of the method in use and times its frames: the first sitting. The method and its settings are those of
+/// the place as it stands ([`OpenPlace::set`]).
 ///
 /// # Errors
 /// Those of frames; one with the code of an interrupt when Ctrl-C was pressed before the fewest rounds were done.
 pub fn paired(open: &mut OpenPlace, effort: &Effort, interrupt: &Interrupt) -> Result<Cost, Failure> {
     let clock = Clock::of(open.session.device())?;
     let (precomputation, tables) = build(open, interrupt)?;
-    let with = open.session.view.clone();
-    let without = View { glints: false, ..with.clone() };
+    let view = open.session.view.clone();
     // The first frames of a shader compile it, and those after a change place their images: both are over after two.
     let mut passes: Vec<Vec<PassSum>> = Vec::new();
     for _ in 0..effort.isolated.max(1) {
-        passes.push(measure::sums(&frame(open, &with, Timing::Isolated, interrupt)?, false));
+        passes.push(measure::sums(&frame(open, &view, Timing::Isolated, interrupt)?, false));
     }
-    frame(open, &without, Timing::Overlapped, interrupt)?;
-
-    let mut rounds: Vec<[f64; 2]> = Vec::new();
-    let mut stretches = Vec::new();
-    let [fewest, most] = effort.rounds.map(|rounds| rounds as usize);
-    let begun = Instant::now();
-    let mut plans = None;
-    while rounds.len() < fewest || (rounds.len() < most && begun.elapsed().as_secs_f64() < effort.seconds) {
-        // In turns, so that what drifts does so for both.
-        let first_without = rounds.len() % 2 == 1;
-        let mut ns = [0.0; 2];
-        let mut runs = [None, None];
-        for is_without in [first_without, !first_without] {
-            let view = if is_without { &without } else { &with };
-            let shot = frame(open, view, Timing::Overlapped, interrupt)?;
-            ns[usize::from(is_without)] = clock.ns(&shot.run)?;
-            stretches.push(clock.stretch(&shot.run));
-            runs[usize::from(is_without)] = Some(Needs::of(&shot.run.plan));
-        }
-        rounds.push(ns);
-        if let [Some(with), Some(without)] = runs {
-            plans = Some([with, without]);
-        }
-    }
-    let Some([needs_with, needs_without]) = plans else {
-        return Err(Failure::bad_input("an effort without rounds measures nothing"));
-    };
+    let Sitting { rounds, needs: [with, without] } = sit(open, effort, interrupt)?;
     let memory: Vec<Bytes> = open.session.executor.memory().into_iter().map(bytes).collect();
     let kept = |row: &&Bytes| {
-        let of_glints = row.lifetime == Lifetime::Settings.name() || needs_with.kept.contains(&row.name);
+        let of_glints = row.lifetime == Lifetime::Settings.name() || with.kept.contains(&row.name);
         row.lifetime != Lifetime::Frame.name() && of_glints && !open.without_glints.contains(&row.name)
     };
-    let shared = needs_with.shared_bytes.saturating_sub(needs_without.shared_bytes);
+    let shared = with.shared_bytes.saturating_sub(without.shared_bytes);
     let glint_bytes = shared + memory.iter().filter(kept).map(|row| row.bytes).sum::<u64>();
-    let run_to_run = RUN_TO_RUN * median(stretches.into_iter());
-    let typical = median(rounds.iter().map(|[with, _]| *with));
-    let relative = typical / median(rounds.iter().map(|[_, without]| *without));
-    Ok(Cost {
+    let mut cost = Cost {
         clock: clock.name().to_owned(),
-        rounds: rounds.len() as u32,
-        glints: spread(rounds.iter().map(|[with, without]| with - without), typical * run_to_run),
-        frame: spread(rounds.iter().map(|[with, _]| *with), typical * run_to_run),
-        ratio: spread(rounds.iter().map(|[with, without]| with / without), relative * run_to_run),
+        sittings: vec![rounds],
         passes: of_passes(&passes),
         tables,
         precomputation,
         glint_bytes,
         memory,
-    })
+        ..nothing_yet()
+    };
+    settle(&mut cost, &Drift::default());
+    Ok(cost)
+}
+
+/// Rounds that were taken one after another, and what their frames need.
+pub(super) struct Sitting {
+    /// Nanoseconds of a frame with glints, and of one without.
+    pub(super) rounds: Vec<[f64; 2]>,
+    needs: [Needs; 2],
+}
+
+/// Takes the rounds of a sitting, after a frame with glints and one without that bring back what other frames drove out.
+pub(super) fn sit(open: &mut OpenPlace, effort: &Effort, interrupt: &Interrupt) -> Result<Sitting, Failure> {
+    let clock = Clock::of(open.session.device())?;
+    let with = open.session.view.clone();
+    let without = View { glints: false, ..with.clone() };
+    let mut needs_of = |view| Ok::<_, Failure>(Needs::of(&frame(open, view, Timing::Overlapped, interrupt)?.run.plan));
+    let needs = [needs_of(&with)?, needs_of(&without)?];
+    let [fewest, most] = effort.rounds.map(|rounds| rounds.max(1) as usize);
+    let begun = Instant::now();
+    let mut rounds: Vec<[f64; 2]> = Vec::new();
+    while rounds.len() < fewest || (rounds.len() < most && begun.elapsed().as_secs_f64() < effort.seconds) {
+        // In turns, so that what drifts does so for both.
+        let first_without = rounds.len() % 2 == 1;
+        let mut ns = [0.0; 2];
+        for is_without in [first_without, !first_without] {
+            let view = if is_without { &without } else { &with };
+            ns[usize::from(is_without)] = clock.ns(&frame(open, view, Timing::Overlapped, interrupt)?.run)?;
+        }
+        rounds.push(ns);
+    }
+    Ok(Sitting { rounds, needs })
 }
 
 /// The cost of nothing: what stands in a line until its cost is known.
@@ -146,7 +134,7 @@ pub(super) fn nothing_yet() -> Cost {
     let none = Estimate::exact(0.0);
     Cost {
         clock: String::new(),
-        rounds: 0,
+        sittings: Vec::new(),
         glints: none,
         frame: none,
         ratio: none,
@@ -228,7 +216,7 @@ pub fn spread(values: impl Iterator<Item = f64> + Clone, least_half_width: f64) 
 }
 
 /// The middle; of an even number, the mean of the middle two. 0 of none.
-fn median(values: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut sorted: Vec<f64> = values.collect();
     sorted.sort_by(f64::total_cmp);
     match sorted.len() {

@@ -34,7 +34,7 @@ fn errors(w1: f64) -> Errors {
 fn point(scene: &str, method: &str, milliseconds: f64, w1: f64) -> Point {
     let cost = Cost {
         clock: "cpu".to_owned(),
-        rounds: 3,
+        sittings: vec![vec![[2e7, 1e7]; 3]],
         glints: about(milliseconds * 1e6),
         frame: about(1e8),
         ratio: about(1.0 + milliseconds / 100.0),
