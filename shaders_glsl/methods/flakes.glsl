@@ -2,6 +2,7 @@
 //
 // Every flake in the pixel's footprint is looked at, and each light tested against it; the environment is what each
 // flake mirrors, averaged over its cone. A pixel that is not finished goes on in the next pass from where it stopped.
+#include "shared/cone_means.glsl"
 #include "shared/flakes_in_footprint.glsl"
 #include "shared/lit_probability.glsl"
 #include "shared/microfacet.glsl"
@@ -20,7 +21,6 @@ const uint WALK_OVER = 2u;
 const uint EXPECTED_NORMALS = 512u; // Normals that stand for infinitely many flakes under the environment.
 
 layout(std430, binding = 50) buffer Walkers { Walker walkers[]; }; // One a pixel.
-layout(binding = 51) uniform texture2D environment_cone; // The environment by the flakes' cones.
 layout(push_constant) uniform Params {
   uint material; // Index of the material.
   float alpha; // Roughness.
@@ -34,6 +34,7 @@ layout(push_constant) uniform Params {
   float most_steps; // A footprint that may take more shows what is expected of it.
   uint steps; // Taken in this pass at most.
   uint last; // 1 in the last pass of a frame.
+  uint small_light_count; // Small bright lights of the environment.
 };
 
 // What light of one direction adds if a flake of weight 1 is lit, times the flakes' number and the cone's solid angle:
@@ -46,8 +47,9 @@ vec3 reflected(GlintSurface surface, Arrival arrival, float area) {
   return arrival.irradiance * schlick(surface.f0, i_h) * (max(i_n, 0.0) * i_h * shadowing / area);
 }
 
-// What a flake of this normal mirrors of the environment, over its weight, the flakes' number and the footprint's area.
-vec3 mirrored_environment(GlintSurface surface, vec3 m, mat3 from_local) {
+// What a flake of this normal mirrors of the environment, with so many of its small lights, over its weight, the flakes' number
+// and the footprint's area.
+vec3 mirrored_environment(GlintSurface surface, vec3 m, mat3 from_local, uint small) {
   vec3 o = surface.o;
   vec3 facet = from_local * m;
   float o_m = dot(o, facet);
@@ -56,8 +58,7 @@ vec3 mirrored_environment(GlintSurface surface, vec3 m, mat3 from_local) {
   if (o_m <= 0.0 || r_n <= 0.0) {
     return vec3(0.0);
   }
-  vec2 uv = equirect_from(environment_from_scene(r));
-  vec3 light = textureLod(sampler2D(environment_cone, linear_wrap_u), uv, 0.0).rgb;
+  vec3 light = environment_over_cone(environment_from_scene(r), small);
   float shadowing = beckmann_g1_over_cosine(r_n, alpha) * r_n * beckmann_g1_over_cosine(dot(o, surface.normal), alpha);
   return frame.environment.z * light * schlick(surface.f0, o_m) * (o_m * shadowing);
 }
@@ -69,11 +70,19 @@ vec3 expected_radiance(GlintSurface surface, mat3 to_local, double sin2_half_gam
   vec3 radiance = vec3(0.0);
   for (uint index = 0u; index < frame.has_environment * EXPECTED_NORMALS; ++index) {
     vec3 m = sample_beckmann(hammersley(index, EXPECTED_NORMALS), alpha);
-    radiance += mirrored_environment(surface, m, to_local) / (m.z * float(EXPECTED_NORMALS));
+    radiance += mirrored_environment(surface, m, to_local, 0u) / (m.z * float(EXPECTED_NORMALS));
   }
-  for (uint index = 0u; index < frame.light_count; ++index) {
-    if ((surface.shadowed >> index & 1u) == 0u) {
-      Arrival arrival = arrival_at(lights[index], surface.position);
+  // The scene's lights and then the environment's small ones, which few normals would find or miss by chance.
+  for (uint index = 0u; index < frame.light_count + small_light_count; ++index) {
+    bool of_environment = index >= frame.light_count;
+    if (of_environment || (surface.shadowed >> index & 1u) == 0u) {
+      Arrival arrival;
+      if (of_environment) {
+        SmallLight light = small_lights[index - frame.light_count];
+        arrival = Arrival(scene_from_environment(light.direction), frame.environment.z * light.irradiance, 1e30);
+      } else {
+        arrival = arrival_at(lights[index], surface.position);
+      }
       vec3 i = arrival.direction;
       vec3 sum = i + surface.o;
       float h_n = dot(sum, n) * inversesqrt(max(dot(sum, sum), 1e-12));
@@ -146,7 +155,9 @@ vec3 glint_radiance(GlintSurface surface) {
         }
         for (bool mirrors = inside && lit_by_environment; mirrors; mirrors = false) {
           --steps_left;
-          radiance += weight / (area * flakes) * mirrored_environment(surface, normal / weight, from_local);
+          radiance += weight / (area * flakes) * mirrored_environment(
+            surface, normal / weight, from_local, small_light_count
+          );
         }
       }
     }

@@ -12,7 +12,14 @@ vec3 environment_from_scene(vec3 direction) {
   return vec3(turn.x * direction.x - turn.y * direction.z, direction.y, turn.y * direction.x + turn.x * direction.z);
 }
 
-// Radiance about the mirror direction as a lobe of this roughness sees it.
+// Out of it.
+vec3 scene_from_environment(vec3 stored) {
+  vec2 turn = frame.environment.xy;
+  return vec3(turn.x * stored.x + turn.y * stored.z, stored.y, -turn.y * stored.x + turn.x * stored.z);
+}
+
+// Radiance about the mirror direction as a lobe of this roughness sees it. Layers are mixed evenly in their spacing: in alpha^2, as
+// `blurred_moment` has it, less light leaks into the dark, but means are farther off (engine/design/0011-cost-of-exactness.md).
 vec3 prefiltered_radiance(texture2DArray prefiltered, vec3 direction, float alpha) {
   float layer = sqrt(clamp(alpha, 0.0, 1.0)) * float(SPECULAR_LAYERS - 1u);
   float below = min(floor(layer), float(SPECULAR_LAYERS - 2u));

@@ -69,8 +69,9 @@ fn two_moments_do_not_sparkle_in_a_furnace() {
     }
 }
 
-/// Under a sky with a sun, against each flake by itself: few flakes looked at one by one and the sun taken out are as near as
-/// as many flakes of another seed; many, by two moments, have mean and variance. With the sun in the moments the pixels are
+/// Under a sky with a sun, against each flake by itself: few flakes looked at one by one and the sun taken out are nearly as
+/// near as as many flakes of another seed (the rest of the sky is that of 64 directions a cone); many, by two moments, have mean
+/// and variance. With the sun in the moments the pixels are
 /// spread over what no flake shows.
 #[test]
 fn two_moments_and_lights_follow_the_flakes() {
@@ -89,7 +90,7 @@ fn two_moments_and_lights_follow_the_flakes() {
     };
     let other_flakes = apart(2.0, None, 96).0;
     let one_by_one = apart(2.0, Some(few), 96).0;
-    assert!(one_by_one < 0.06 && other_flakes < 0.06, "{one_by_one} {other_flakes}");
+    assert!(one_by_one < 0.08 && other_flakes < 0.03, "{one_by_one} {other_flakes}");
     assert!(apart(2.0, Some(sun_inside), 96).0 > 4.0 * one_by_one);
     let (w1, [mean, variance]) = apart(100.0, Some(TWO_MOMENTS), 64);
     assert!(w1 < 0.06 && (mean - 1.0).abs() < 0.05 && (variance - 1.0).abs() < 0.15, "{w1} {mean} {variance}");

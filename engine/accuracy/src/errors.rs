@@ -12,7 +12,7 @@
 //!   factor on both pictures changes nothing. For methods that promise the very pixels.
 //! - **energy per glint**: mean L of the pixels that glint over the reference's. A pixel glints if L is above twice the mean of
 //!   its tile in its own picture.
-//! - **FLIP, HDR-FLIP**: of the whole pictures (`flip.rs`).
+//! - **FLIP, HDR-FLIP**: of the whole pictures (`flip.rs`); none where there are no glints on either side, as 0 would be praise.
 //!
 //! Intervals are those of a bootstrap over tiles (`tiles.rs`). What is not defined, as a ratio to a black reference, is not
 //! a number, and `null` in JSON.
@@ -37,8 +37,8 @@ pub struct Pixels<'a> {
     pub glinting: &'a [bool],
     /// Flakes expected in the footprint, lit or not; whatever it likes where the pixel is not glinting.
     pub flakes: &'a [f32],
-    /// Factor of the radiance before tone mapping, for FLIP.
-    pub exposure: f32,
+    /// Factor of the radiance before tone mapping, for FLIP, which takes longer than all else; none leaves it out.
+    pub exposure: Option<f32>,
 }
 
 /// What is seen in each pixel, linear and scene-referred.
@@ -136,10 +136,7 @@ impl Errors {
             tiles.sums(|pixel, _| [relative_squares(x[pixel], r[pixel], reference.variance[pixel], FLOOR * mean), 1.0]);
         let rel_mse = bootstrap.ratio(&relative);
 
-        let [shown, shown_r] = [picture.whole, reference.radiance.whole].map(|whole| displayed(whole, pixels.exposure));
-        let flip = ErrorMap::of_displayed(pixels.size, &shown, &shown_r)?;
-        let hdr_flip = ErrorMap::of_radiance(pixels.size, picture.whole, reference.radiance.whole)?;
-
+        let [flip, hdr_flip] = flips(pixels, picture, &reference.radiance)?;
         let (bands, w1) = bands(&tiles, &bootstrap, pixels.flakes, &luminance);
         Ok(Self {
             pixels: inside.len(),
@@ -148,8 +145,8 @@ impl Errors {
             variance_ratio: bootstrap.of_sums(&moments, variance_ratio),
             w1,
             rel_mse: rel_mse.at_least_zero(),
-            flip: flip.mean(),
-            hdr_flip: hdr_flip.map_or(Estimate::UNKNOWN, |map| map.mean()),
+            flip,
+            hdr_flip,
             energy_per_glint: bootstrap.of_sums(&glints(&tiles, &luminance), |[light, pixels, light_r, pixels_r]| {
                 ratio(ratio(light, pixels), ratio(light_r, pixels_r))
             }),
@@ -157,6 +154,18 @@ impl Errors {
             path: None,
         })
     }
+}
+
+/// FLIP and HDR-FLIP of two pictures; unknown where neither has glints, and where they are not asked for.
+fn flips(pixels: &Pixels<'_>, picture: &Radiance<'_>, reference: &Radiance<'_>) -> Result<[Estimate; 2], ErrorsError> {
+    let is_dark = |seen: &Radiance<'_>| seen.glints.as_flattened().iter().all(|channel| *channel == 0.0);
+    let Some(exposure) = pixels.exposure.filter(|_| !(is_dark(picture) && is_dark(reference))) else {
+        return Ok([Estimate::UNKNOWN; 2]);
+    };
+    let [shown, shown_r] = [picture, reference].map(|seen| displayed(seen.whole, exposure));
+    let flip = ErrorMap::of_displayed(pixels.size, &shown, &shown_r)?;
+    let hdr_flip = ErrorMap::of_radiance(pixels.size, picture.whole, reference.whole)?;
+    Ok([flip.mean(), hdr_flip.map_or(Estimate::UNKNOWN, |map| map.mean())])
 }
 
 /// Of each tile: sums of luminance, and of its squares about the tile's mean, of the picture and of the reference.
@@ -224,7 +233,7 @@ mod tests {
     /// Compares glints, seen on black.
     fn compare(size: [u32; 2], picture: &[[f32; 3]], reference: &[[f32; 3]], variance: f32) -> Errors {
         let (all, flakes) = (vec![true; picture.len()], vec![3.0; picture.len()]);
-        let pixels = Pixels { size, glinting: &all, flakes: &flakes, exposure: 1.0 };
+        let pixels = Pixels { size, glinting: &all, flakes: &flakes, exposure: Some(1.0) };
         let variance = vec![[variance; 3]; reference.len()];
         let seen = |glints| Radiance { glints, whole: glints };
         let reference = Reference { radiance: seen(reference), variance: &variance };
@@ -362,7 +371,7 @@ mod tests {
         glinting[900] = false;
         glinting[7] = false;
         let flakes = vec![3.0; COUNT];
-        let pixels = Pixels { size: SIZE, glinting: &glinting, flakes: &flakes, exposure: 1.0 };
+        let pixels = Pixels { size: SIZE, glinting: &glinting, flakes: &flakes, exposure: Some(1.0) };
         let variance = vec![[0.0; 3]; COUNT];
         let black = vec![[0.0; 3]; COUNT];
         let reference = Reference { radiance: Radiance { glints: &reference, whole: &black }, variance: &variance };
@@ -376,7 +385,7 @@ mod tests {
     #[test]
     fn lists_of_other_lengths_are_refused_by_name() {
         let (all, flakes, four) = ([true; 4], [1.0; 4], [[1.0; 3]; 4]);
-        let pixels = Pixels { size: [2, 2], glinting: &all, flakes: &flakes, exposure: 1.0 };
+        let pixels = Pixels { size: [2, 2], glinting: &all, flakes: &flakes, exposure: Some(1.0) };
         let seen = |glints, whole| Radiance { glints, whole };
         let reference = Reference { radiance: seen(&four, &four), variance: &four };
         let error = Errors::between(&pixels, &seen(&four, &four[..3]), &reference);
@@ -401,7 +410,8 @@ mod tests {
                     let Errors { mean_ratio, flip, .. } = read;
                     let is_defined = count > 0 && reference > 0.0 && reference.is_finite() && picture.is_finite();
                     assert_eq!(mean_ratio.value.is_finite(), is_defined, "{size:?}: {picture} on {reference}");
-                    assert_eq!(flip.value.is_finite(), count > 0, "{size:?}: {picture} on {reference}");
+                    let has_glints = picture != 0.0 || reference != 0.0;
+                    assert_eq!(flip.value.is_finite(), count > 0 && has_glints, "{size:?}: {picture} on {reference}");
                 }
             }
         }

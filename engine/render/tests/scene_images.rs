@@ -226,6 +226,10 @@ fn texels_that_are_no_light_are_repaired_and_counted() {
     assert_eq!(map.texels, [[0.0, 1.0, 0.0], [65504.0, 0.0, 2.0], [0.0; 3], [1.0, 2.0, 3.0]]);
     assert_eq!((report.nan_texels, report.negative_texels, report.infinite_texels), (1, 2, 1));
     assert_eq!(report.warnings.len(), 4, "three repairs and a shape that is not 2:1: {:?}", report.warnings);
+    let one_bad = |x: usize, y: usize| (if [x, y] == [3, 2] { f32::NAN } else { -0.0 }, 1.0, 1.0);
+    let (_, report) = EquirectMap::from_file_bytes("sky.exr", &exr_bytes(6, 3, one_bad)).expect("read");
+    assert_eq!((report.first_changed, report.warnings.len()), (Some([3, 2]), 1));
+    assert!(report.warnings[0].ends_with("in column 3 of row 2"), "{:?}", report.warnings);
 }
 
 #[test]

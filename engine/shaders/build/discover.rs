@@ -17,12 +17,13 @@ struct Choice {
     key: &'static str,
 }
 
-const CHOICES: [Choice; 5] = [
+const CHOICES: [Choice; 6] = [
     Choice { include: "method.glsl", folder: "methods", key: "method" },
     Choice { include: "occlusion.glsl", folder: "occlusion", key: "occlusion" },
     Choice { include: "probability.glsl", folder: "rungs/probability", key: "probability" },
     Choice { include: "count.glsl", folder: "rungs/count", key: "count" },
     Choice { include: "arithmetic.glsl", folder: "rungs/arithmetic", key: "arithmetic" },
+    Choice { include: "bits.glsl", folder: "rungs/bits", key: "bits" },
 ];
 
 /// What a per-variant include stands for in one variant.

@@ -28,10 +28,7 @@ vec3 extracted_radiance(vec3 n, vec3 o, mat3 from_local, vec3 f0, float count, f
   float solid_angle = 4.0 * PI * params.sin2_half_gamma;
   vec3 radiance = vec3(0.0);
   for (uint index = 0u; index < params.light_count; ++index) {
-    // From the environment's frame, which the rotation carries into the scene's.
-    vec3 stored = extracted[2u * index].xyz;
-    vec2 turn = frame.environment.xy;
-    vec3 i = vec3(turn.x * stored.x + turn.y * stored.z, stored.y, -turn.y * stored.x + turn.x * stored.z);
+    vec3 i = scene_from_environment(extracted[2u * index].xyz);
     vec3 sum = i + o;
     float i_n = dot(i, n);
     float h_n = dot(sum, n) * inversesqrt(max(dot(sum, sum), 1e-12));

@@ -2,9 +2,11 @@
 
 use crate::budget::BudgetArgs;
 use crate::change::Change;
+use crate::stability::StabilityArgs;
 use crate::study::Lighting;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use glam::DVec3;
+use mica_accuracy::exactness::Chart;
 use mica_render::scene::Light;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
@@ -43,6 +45,8 @@ pub enum Command {
     Doctor(DoctorArgs),
     /// Evaluate the glint model in f64, flake by flake, without a GPU.
     Oracle(OracleArgs),
+    /// Run the numerical hard cases on a device: naive forms, stable ones, and how wrong each is.
+    Stability(StabilityArgs),
 }
 
 /// For commands that print little.
@@ -193,7 +197,7 @@ pub struct ExplainArgs {
     after_long_help = "Without --occlusion, every method with every rung of its ladder (see `mica methods`) at every scene, size and \
     lighting. The time of glints is that of a frame with them less that of the same frame without, in turns in one \
     run: processor time of the process where the device is the processor, timestamps of the device elsewhere. Figures \
-    are medians over the rounds of three sittings, between which all other points of the place are timed; after ± stands what rounds and \
+    are medians over the rounds of three sittings, between which all other points of the place are timed; after ± (+a/-b where these differ by more than a third) stands what rounds and \
     sittings differ by, and no less than 5 % of the frame. Tables are those a method makes anew when a setting changes, without the compilation of \
     shaders."
 )]
@@ -262,7 +266,7 @@ pub struct BenchArgs {
     at every flake in 8x8 and again in 9x9 parts of every pixel (4x4 and 5x5 with --quick), and says how far the two are \
     apart. W1 is the Wasserstein-1 distance between the luminances of pixels, by the number of flakes in a pixel, over \
     the reference's mean; mean ratio is over the reference's; FLIP compares the pictures as they are seen. After ± \
-    stands the farther end of an interval of 95 %. The time of glints is that of a frame with them less that of the \
+    stands the farther end of an interval of 95 %, or +a/-b where the ends differ by more than a third. The time of glints is that of a frame with them less that of the \
     same frame without, in turns in one run: processor time of the process where the device is the processor. \
     Repeating a study changes no error. \
     Each point is timed in three sittings, between which all others of the place are, so that a spread tells what \
@@ -290,6 +294,9 @@ pub struct AccuracyArgs {
     /// its nanoseconds.
     #[arg(long, conflicts_with = "method")]
     pub exactness: bool,
+    /// A chart of --exactness to measure (repeatable). Default: all.
+    #[arg(long, value_name = "NAME", requires = "exactness", value_parser = chart)]
+    pub chart: Vec<Chart>,
     /// A contact sheet of all methods on all embedded scenes but the large one.
     #[arg(long, value_name = "FILE.png")]
     pub sheet: Option<PathBuf>,
@@ -444,6 +451,11 @@ pub const ALPHAS: RangeInclusive<f64> = 0.001..=1.0;
 pub const GAMMAS_DEG: RangeInclusive<f64> = 0.01..=30.0;
 /// Coordinates beyond this are meaningless in metres, and their squares leave f32.
 pub const LARGEST_COORDINATE: f64 = 1e9;
+
+fn chart(text: &str) -> Result<Chart, String> {
+    let names = || Chart::ALL.map(Chart::name).join(", ");
+    Chart::ALL.into_iter().find(|chart| chart.name() == text).ok_or_else(|| format!("expected one of {}", names()))
+}
 
 fn size(text: &str) -> Result<[u32; 2], String> {
     let wanted = || format!("expected WIDTHxHEIGHT, each 1 to {LARGEST_SIDE}, such as 1920x1080");

@@ -26,6 +26,7 @@ mod report_text;
 mod scene_choice;
 mod scenes;
 mod session;
+mod stability;
 mod study;
 mod table;
 
@@ -62,6 +63,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Accuracy(args) => accuracy::accuracy(args),
         Command::Doctor(args) => doctor::doctor(args),
         Command::Oracle(args) => oracle::oracle(args),
+        Command::Stability(args) => stability::stability(args),
     }
 }
 

@@ -3,7 +3,6 @@
 //! The truth is each flake by itself, which mirrors its own cone. The other rungs know less of what is mirrored: its mean, its
 //! mean and mean square, or a table of both by normal and view. The error is that of the distribution of pixels.
 
-use super::extract::{ExtractedLight, extract_lights};
 use super::moments::{MomentTables, TwoMoments, shade};
 use super::resample::resampled;
 use super::{Chart, EXACTNESS_SCHEMA, Effort, ExactnessError, ExactnessLine, in_turn, pass_ns, spread};
@@ -11,7 +10,7 @@ use crate::{Condition, Estimate, Machine, Stage};
 use mica_gpu::{Executor, Timing};
 use mica_graph::{Format, Graph, Image};
 use mica_oracle::statistics::wasserstein_1;
-use mica_render::scene::{EquirectMap, Light, procedural};
+use mica_render::scene::{EquirectMap, SmallLight, procedural};
 use mica_render::{Environment, Progress};
 
 /// Roughness and half-angle of the cone, degrees.
@@ -77,7 +76,7 @@ const RUNGS: [Rung; 7] = [
 pub struct Sky {
     environment: Environment,
     /// The lights that were taken out of its map, and what is left.
-    parted: (Vec<ExtractedLight>, EquirectMap),
+    parted: (Vec<SmallLight>, EquirectMap),
     /// By method; two moments shade the pixels of the first.
     stages: Vec<(&'static str, Stage)>,
     /// Without and with lights taken out.
@@ -97,16 +96,10 @@ impl Sky {
     /// Those of the device.
     pub fn new(map: EquirectMap, rotation_deg: f64) -> Result<Self, ExactnessError> {
         let environment = Environment { map, rotation_radians: rotation_deg.to_radians() };
-        // A flake tests a light as it is; a map averaged over cones by samples shows a sun that is smaller than they are apart as
-        // noise. So the truth has what is small and bright as lights.
-        let (extracted, rest) = extract_lights(&environment.map);
-        let parted = Environment { map: rest, ..environment.clone() };
-        let lights: Vec<Light> = extracted.iter().map(|light| light.turned(environment.rotation_radians)).collect();
+        let parted = environment.map.part_small_lights();
         let mut stages = Vec::new();
         for method in ["smooth", "wang2020", "flakes"] {
-            let (lights, environment) =
-                if method == "flakes" { (&lights[..], &parted) } else { (&[][..], &environment) };
-            let mut stage = Stage::lit(method, &condition([0.1, 6.0], 1.0), lights, Some(environment))?;
+            let mut stage = Stage::lit(method, &condition([0.1, 6.0], 1.0), &[], Some(&environment))?;
             let settings: &[(&str, &str)] = match method {
                 "wang2020" => &[("blur", "false"), ("depth", "10")],
                 "flakes" => &[("most", "2000")],
@@ -117,7 +110,7 @@ impl Sky {
             }
             stages.push((method, stage));
         }
-        Ok(Self { environment, parted: (extracted, parted.map), stages, tables: None, gamma_deg: 0.0 })
+        Ok(Self { environment, parted, stages, tables: None, gamma_deg: 0.0 })
     }
 
     fn stage(&mut self, method: &str) -> &mut Stage {

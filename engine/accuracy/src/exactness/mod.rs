@@ -7,7 +7,6 @@
 mod arithmetic;
 mod count_law;
 pub mod environment;
-pub mod extract;
 pub mod footprint;
 mod kernel;
 mod lit_probability;

@@ -1,18 +1,13 @@
 //! Flakes under an environment by two moments (shaders_glsl/shared/two_moments.glsl): the tables, and the pass that shades.
 
-use super::extract::ExtractedLight;
 use crate::Condition;
 use mica_graph::{Buffer, Extent, Format, Graph, Image, ImageDesc, Lifetime};
 use mica_render::Frame;
-use mica_render::scene::EquirectMap;
+use mica_render::scene::{EquirectMap, SmallLight};
 use mica_shaders::types::TexelMoments;
-use mica_shaders::{
-    constants as c, environment_cone, environment_moments, moments_finest, moments_halve, moments_lobes,
-};
+use mica_shaders::{constants as c, environment_moments, moments_finest, moments_halve, moments_lobes};
 use std::sync::Arc;
 
-/// Directions drawn in each cone.
-const CONE_SAMPLES: u32 = 64;
 /// Normals drawn for each texel of the tables.
 const LOBE_SAMPLES: u32 = 64;
 
@@ -38,19 +33,12 @@ pub struct MomentTables {
 
 impl MomentTables {
     /// Declares the passes that make the tables of a map.
-    pub fn new(g: &mut Graph, map: &EquirectMap, lights: &[ExtractedLight], gamma_deg: f64) -> Self {
-        let environment = uploaded(g, map);
-        let sin2_half_gamma = (0.5 * gamma_deg.to_radians()).sin().powi(2);
-        let finest = Extent::new(c::MOMENTS_WIDTH, c::MOMENTS_WIDTH / 2);
+    pub fn new(g: &mut Graph, map: &EquirectMap, lights: &[SmallLight], gamma_deg: f64) -> Self {
+        let means = map.cone_means(gamma_deg.to_radians(), c::MOMENTS_WIDTH);
+        let finest = Extent::new(means.width, means.height);
         let mut cone = Image::new("moments_cone", ImageDesc::new(Format::Rgba32Float, finest), Lifetime::Settings);
-        let desc = environment.desc();
-        let texels_a_sample = sin2_half_gamma * desc.extent.texels() as f64 / f64::from(CONE_SAMPLES);
-        let params = environment_cone::Params {
-            samples: CONE_SAMPLES,
-            sin2_half_gamma: sin2_half_gamma as f32,
-            level: (0.5 * texels_a_sample.log2()).clamp(0.0, f64::from(desc.mips - 1)) as f32,
-        };
-        g.pass(environment_cone::Bind { environment: &environment, cone: &mut cone }, params, finest);
+        let texels: Vec<[f32; 4]> = means.texels.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
+        g.upload_image(&mut cone, Arc::<[u8]>::from(bytemuck::cast_slice::<_, u8>(&texels)));
 
         let texels: u64 = (0..c::MOMENTS_LEVELS).map(|level| finest.texels() >> (2 * level)).sum();
         let mut levels = g.buffer("moment_levels", texels * size_of::<TexelMoments>() as u64);
@@ -77,24 +65,6 @@ impl MomentTables {
         g.upload(&mut buffer, bytes);
         Self { cone, first, second, lights: buffer, light_count: lights.len() as u32 }
     }
-}
-
-/// A map on the device with all its levels.
-fn uploaded(g: &mut Graph, map: &EquirectMap) -> Image {
-    let mut levels = vec![map.clone()];
-    while let Some(last) = levels.last()
-        && (last.width > 1 || last.height > 1)
-    {
-        let next = last.half();
-        levels.push(next);
-    }
-    let extent = Extent::new(map.width, map.height);
-    let desc = ImageDesc { mips: levels.len() as u32, ..ImageDesc::new(Format::Rgba32Float, extent) };
-    let texels = levels.iter().flat_map(|level| &level.texels).map(|&[r, g, b]| [r, g, b, 1.0]);
-    let texels: Vec<[f32; 4]> = texels.collect();
-    let mut image = Image::new("environment", desc, Lifetime::Frame);
-    g.upload_image(&mut image, Arc::<[u8]>::from(bytemuck::cast_slice::<_, u8>(&texels)));
-    image
 }
 
 /// Declares the pass that shades a frame's pixels by two moments.

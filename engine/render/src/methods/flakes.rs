@@ -1,12 +1,12 @@
 //! Jakob et al. 2014: "Discrete Stochastic Microfacet Models", flake by flake: the reference on the GPU.
 //!
 //! The model is the paper's; the flakes are those of `engine/design/0007-flake-set.md`, the same in the oracle. Each flake in
-//! the footprint is tested against each light in f64, and mirrors its own cone of the environment. Nothing is
-//! estimated, but:
+//! the footprint is tested against each light in f64, and mirrors its own cone of the environment: the texels' exact share of it,
+//! and of small bright lights, as the sun is, what lies in the cone. Nothing is estimated, but:
 //! - F, G and h are those of the cone's centre, as in the paper;
 //! - flakes weigh 1 / (m.n), which the paper's own program leaves out;
 //! - a footprint of more than `most` flakes shows what is expected of it, which is the same in the mean and has no fluctuation: P for each
-//!   light, and under the environment the mean over 512 normals spread evenly over their distribution;
+//!   light, also the environment's small ones, and under the rest of it the mean over 512 normals spread evenly over their distribution;
 //! - shadowing is Smith's rational fit, for flakes as for the smooth surface.
 //!
 //! A pixel may take more loop iterations than an invocation may: the work is split over passes, each of which goes
@@ -16,7 +16,7 @@
 //! under many lights, the largest footprints show what is expected of them. Needs shaderInt64 and shaderFloat64.
 
 use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints, leaf_level};
-use crate::environment_tables::EnvironmentTables;
+use crate::environment_tables::{Cones, EnvironmentTables};
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Buffer, Extent, Graph, Image, Lifetime};
 use mica_shaders::glints::flakes::{Bind, Params};
@@ -80,9 +80,9 @@ struct Counts {
     made_for: (u64, u32),
 }
 
-/// The environment by the flakes' cones, and the angle that it was made for.
-struct Cone {
-    image: Image,
+/// What the flakes mirror, and the half-angle that it was made for.
+struct Mirrored {
+    cones: Cones,
     gamma_deg: f64,
 }
 
@@ -90,7 +90,7 @@ struct Cone {
 #[derive(Default)]
 pub(crate) struct EveryFlake {
     counts: BTreeMap<usize, Counts>,
-    cones: BTreeMap<usize, Cone>,
+    mirrored: BTreeMap<usize, Mirrored>,
 }
 
 /// Parts `count` flakes level by level down to `level`.
@@ -115,7 +115,7 @@ impl Method for EveryFlake {
     fn keep(&mut self, materials: &[GlintMaterial]) {
         let kept = |index: &usize| materials.iter().any(|material| material.index == *index);
         self.counts.retain(|index, _| kept(index));
-        self.cones.retain(|index, _| kept(index));
+        self.mirrored.retain(|index, _| kept(index));
     }
 
     fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables) {
@@ -133,17 +133,18 @@ impl Method for EveryFlake {
             self.counts.insert(material.index, Counts { buffer, made_for: set });
         }
         let gamma_deg = material.values.number("gamma_deg");
-        let before = self.cones.get(&material.index).map(|cone| cone.gamma_deg);
+        let before = self.mirrored.get(&material.index).map(|mirrored| mirrored.gamma_deg);
         if before != Some(gamma_deg) {
             let change = if before.is_some() { "gamma is now" } else { "first frame with gamma" };
             g.because(format!("material {}: {change} {gamma_deg} degrees", material.name));
-            let image = environment.cone(g, material.sin2_half_gamma());
-            self.cones.insert(material.index, Cone { image, gamma_deg });
+            let cones = environment.cones(g, gamma_deg.to_radians());
+            self.mirrored.insert(material.index, Mirrored { cones, gamma_deg });
         }
     }
 
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
-        let (Some(counts), Some(cone)) = (self.counts.get(&material.index), self.cones.get(&material.index)) else {
+        let index = material.index;
+        let (Some(counts), Some(Mirrored { cones, .. })) = (self.counts.get(&index), self.mirrored.get(&index)) else {
             return;
         };
         let count = material.flakes();
@@ -172,11 +173,14 @@ impl Method for EveryFlake {
                 most_steps: most_steps as f32,
                 steps: steps as u32,
                 last: u32::from(pass == passes),
+                small_light_count: cones.light_count,
             };
             let bind = bind_glints!(
                 Bind, shading, glints,
                 walkers: &mut walkers,
-                environment_cone: &cone.image,
+                environment_cone: &cones.means,
+                light_rings: &cones.rings,
+                small_lights: &cones.lights,
                 flake_counts: &counts.buffer,
             );
             g.pass(bind, params, extent);

@@ -2,16 +2,13 @@
 
 use crate::environment_tables::{Lobe, Ndf};
 use mica_graph::{Extent, Graph, Image};
-use mica_shaders::{constants as c, environment_cone, environment_irradiance, environment_specular, specular_albedo};
+use mica_shaders::{constants as c, environment_irradiance, environment_specular, specular_albedo};
 
 /// Normals drawn for each texel of the prefiltered environment.
 const SPECULAR_SAMPLES: u32 = 64;
 /// Normals drawn for each entry of the albedo table: the tests find the means of a plane and a sphere under a constant
 /// sky within 0.07 % of the f64 evaluation.
 const ALBEDO_SAMPLES: u32 = 1024;
-/// Directions drawn in each cone.
-const CONE_SAMPLES: u32 = 64;
-
 /// Directions summed for each texel of the irradiance, along the horizon and from pole to pole.
 const IRRADIANCE_DIRECTIONS: [u32; 2] = [64, 32];
 
@@ -47,18 +44,4 @@ pub(crate) fn specular(g: &mut Graph, map: &Image, ndf: Ndf, lobe: &mut Lobe) {
     let params = specular_albedo::Params { samples: ALBEDO_SAMPLES, beckmann };
     let extent = lobe.albedo.extent();
     g.pass(specular_albedo::Bind { albedo: &mut lobe.albedo }, params, extent);
-}
-
-/// Fills `cone` with averages over the cone of a half-angle.
-pub(crate) fn cone(g: &mut Graph, map: &Image, sin2_half_gamma: f64, cone: &mut Image) {
-    let desc = map.desc();
-    // A texel of 4 pi / texels, and a sample's part of the 4 pi sin^2(gamma/2) of the cone.
-    let texels_a_sample = sin2_half_gamma * desc.extent.texels() as f64 / f64::from(CONE_SAMPLES);
-    let params = environment_cone::Params {
-        samples: CONE_SAMPLES,
-        sin2_half_gamma: sin2_half_gamma as f32,
-        level: (0.5 * texels_a_sample.log2()).clamp(0.0, f64::from(desc.mips - 1)) as f32,
-    };
-    let extent = cone.extent();
-    g.pass(environment_cone::Bind { environment: map, cone }, params, extent);
 }

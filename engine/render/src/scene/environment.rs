@@ -29,6 +29,8 @@ pub struct EnvironmentReport {
     pub infinite_texels: u64,
     /// Texels with a finite channel above [`EquirectMap::GREATEST`], which it became.
     pub huge_texels: u64,
+    /// Column and row of the first texel that was changed.
+    pub first_changed: Option<[u32; 2]>,
     /// What else there was to say, such as a shape that is not 2:1.
     pub warnings: Vec<String>,
 }
@@ -82,8 +84,7 @@ impl EquirectMap {
     pub fn integral(&self) -> [f64; 3] {
         let mut sum = [0.0; 3];
         for (row, texels) in self.texels.chunks_exact(self.width as usize).enumerate() {
-            let solid_angle = TAU / f64::from(self.width)
-                * band(row as f64 / f64::from(self.height), (row + 1) as f64 / f64::from(self.height));
+            let solid_angle = self.solid_angle(row as u32);
             for texel in texels {
                 for c in 0..3 {
                     sum[c] += f64::from(texel[c]) * solid_angle;
@@ -91,6 +92,12 @@ impl EquirectMap {
             }
         }
         sum
+    }
+
+    /// The solid angle of a texel of a row, steradians.
+    pub(super) fn solid_angle(&self, row: u32) -> f64 {
+        TAU / f64::from(self.width)
+            * band(f64::from(row) / f64::from(self.height), f64::from(row + 1) / f64::from(self.height))
     }
 
     /// The next level of a mip chain: half of each side, rounded down, at least 1.
@@ -128,7 +135,8 @@ impl EquirectMap {
     /// Makes every channel finite and not negative, and counts.
     pub(crate) fn repair(&mut self) -> EnvironmentReport {
         let mut report = EnvironmentReport::default();
-        for texel in &mut self.texels {
+        for (index, texel) in self.texels.iter_mut().enumerate() {
+            let before = *texel;
             report.nan_texels += u64::from(texel.iter().any(|c| c.is_nan()));
             report.negative_texels += u64::from(texel.iter().any(|&c| c < 0.0));
             report.infinite_texels += u64::from(texel.contains(&f32::INFINITY));
@@ -138,6 +146,11 @@ impl EquirectMap {
                 f32::INFINITY => 65504.0,
                 c => c.clamp(0.0, Self::GREATEST),
             });
+            // A zero that has a sign is no light and no fault.
+            let changed = texel.iter().zip(before).any(|(after, before)| *after != before);
+            if changed && report.first_changed.is_none() {
+                report.first_changed = Some([index as u32 % self.width, index as u32 / self.width]);
+            }
         }
         report
     }

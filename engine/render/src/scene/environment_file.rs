@@ -63,7 +63,12 @@ impl EquirectMap {
             (report.huge_texels, "above 1e12, replaced by that"),
         ];
         let repaired = counts.iter().filter(|(count, _)| *count > 0);
-        report.warnings.extend(repaired.map(|(count, what)| format!("{count} texels have channels that are {what}")));
+        let first = report.first_changed.map_or(String::new(), |[column, row]| {
+            format!("; the first texel to be changed is in column {column} of row {row}")
+        });
+        let warnings: Vec<String> =
+            repaired.map(|(count, what)| format!("{count} texels have channels that are {what}{first}")).collect();
+        report.warnings.extend(warnings);
         for warning in &report.warnings {
             log::warn!("{}: {warning}", OneLine(name));
         }

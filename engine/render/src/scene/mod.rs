@@ -3,6 +3,7 @@
 mod atlas;
 pub mod bvh;
 mod centre;
+mod cone_means;
 mod environment;
 mod environment_file;
 mod error;
@@ -12,6 +13,7 @@ mod light;
 mod material;
 mod mesh;
 pub mod procedural;
+mod small_lights;
 mod tangents;
 mod texture;
 
@@ -22,6 +24,7 @@ pub use gltf::LoadLimits;
 pub use light::{Camera, Light};
 pub use material::{AlphaMode, Clearcoat, Glint, Material, Sheen, Specular, TextureRef};
 pub use mesh::{Bounds, Instance, Mesh};
+pub use small_lights::{LightRing, SmallLight};
 pub use texture::{Encoding, MipLevel, Texture, Wrap, mip_count, mip_extent};
 
 use glam::DVec3;

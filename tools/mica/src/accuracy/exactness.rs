@@ -16,8 +16,8 @@ use std::path::Path;
 /// The file of a study's folder.
 const FILE: &str = "exactness.jsonl";
 
-/// Measures, appends to the file and prints, a chart at a time: all of them `anew`, or those that the folder has no lines
-/// of from this machine. What was measured before Ctrl-C or a failure is kept.
+/// Measures, appends to the file and prints, a chart at a time: those that were asked for `anew`, or those that the folder
+/// has no lines of from this machine. What was measured before Ctrl-C or a failure is kept.
 pub fn exactness(
     args: &AccuracyArgs,
     anew: bool,
@@ -30,13 +30,8 @@ pub fn exactness(
     let kept = cache(args.cache.as_deref(), args.no_cache);
     let mut executor = executor(device, kept.as_ref(), args.memory)?;
     let effort = if args.quick { Effort::QUICK } else { Effort::FULL };
-    let is_there = |chart: Chart| {
-        let all = lines.iter().flat_map(|lines| &lines.all);
-        // Some charts ask about occlusion, and say who answered.
-        let same = |of: &Machine| Machine { occlusion: machine.occlusion.clone(), ..of.clone() } == machine;
-        all.filter(|line| same(&line.machine)).any(|line| line.chart == chart.name())
-    };
-    let wanted: Vec<Chart> = Chart::ALL.into_iter().filter(|chart| anew || !is_there(*chart)).collect();
+    let there = lines.as_ref().filter(|_| !anew).map_or(&[][..], |lines| &lines.all);
+    let wanted = wanted(&args.chart, there, &machine);
     interrupt.defer();
     for (done, chart) in wanted.iter().enumerate() {
         if interrupt.requested() {
@@ -57,6 +52,15 @@ pub fn exactness(
         Some(folder) => output::print(&format!("{}\n", folder.join(FILE).display())),
         None => Ok(()),
     }
+}
+
+/// The charts of these names, or all, of which there are no lines from this machine yet.
+fn wanted(asked: &[Chart], there: &[ExactnessLine], machine: &Machine) -> Vec<Chart> {
+    // Some charts ask about occlusion, and say who answered.
+    let is_same = |of: &Machine| Machine { occlusion: machine.occlusion.clone(), ..of.clone() } == *machine;
+    let is_there = |chart: &Chart| there.iter().any(|line| line.chart == chart.name() && is_same(&line.machine));
+    let is_asked_for = |chart: &Chart| asked.is_empty() || asked.contains(chart);
+    Chart::ALL.into_iter().filter(|chart| is_asked_for(chart) && !is_there(chart)).collect()
 }
 
 fn open(folder: &Path) -> Result<Lines<ExactnessLine>, Failure> {
@@ -110,4 +114,35 @@ fn for_people(chart: Chart, lines: &[ExactnessLine]) -> String {
     ];
     let per = lines.first().map(|line| line.per.clone()).unwrap_or_default();
     format!("{}ns: of {per}\n\n", table(&columns, &cells))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mica_accuracy::Estimate;
+
+    fn machine(device: &str, occlusion: &str) -> Machine {
+        let [device, occlusion] = [device, occlusion].map(str::to_owned);
+        Machine { device, occlusion, driver: "driver".to_owned(), build: "build".to_owned() }
+    }
+
+    fn line(chart: Chart, machine: Machine) -> ExactnessLine {
+        let [schema, case, rung, what, error_of, per] = [(); 6].map(|()| String::new());
+        let (error, ns) = (Estimate::exact(1.0), Estimate::exact(1.0));
+        ExactnessLine { schema, chart: chart.name().to_owned(), case, rung, what, error_of, error, ns, per, machine }
+    }
+
+    #[test]
+    fn what_this_machine_has_not_measured_is_wanted() {
+        let here = machine("here", "none");
+        assert_eq!(wanted(&[], &[], &here), Chart::ALL);
+        let there = [
+            line(Chart::CountLaw, here.clone()),
+            line(Chart::Occlusion, machine("here", "bvh")),
+            line(Chart::Arithmetic, machine("elsewhere", "none")),
+        ];
+        let missing = [Chart::LitProbability, Chart::Footprint, Chart::Environment, Chart::Arithmetic];
+        assert_eq!(wanted(&[], &there, &here), missing);
+        assert_eq!(wanted(&[Chart::Arithmetic, Chart::CountLaw], &there, &here), [Chart::Arithmetic]);
+    }
 }

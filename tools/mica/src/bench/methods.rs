@@ -7,7 +7,7 @@ use crate::interrupt::Interrupt;
 use crate::output;
 use crate::progress::Progress;
 use crate::scene_choice;
-use crate::study::{Effort, Lines, OpenPlace, Stop, measure, rungs, sit_again, stops, table_of, unmeasured};
+use crate::study::{Effort, LeftOut, Lines, OpenPlace, Stop, measure, rungs, sit_again, stops, table_of, unmeasured};
 use mica_accuracy::Point;
 use mica_render::{MethodInfo, Rung};
 use std::path::{Path, PathBuf};
@@ -42,7 +42,7 @@ pub fn methods(args: &BenchArgs) -> Result<(), Failure> {
         progress: Progress::new(args.quiet),
         to_stdout,
         lines,
-        worst: None,
+        left_out: LeftOut::default(),
         measured: 0,
     };
     interrupt.defer();
@@ -52,7 +52,7 @@ pub fn methods(args: &BenchArgs) -> Result<(), Failure> {
         output::print(&format!("\n{}: {} points measured\n", path.display(), bench.measured))?;
     }
     finished?;
-    bench.worst.map_or(Ok(()), Err)
+    bench.left_out.end()
 }
 
 struct Bench<'a> {
@@ -63,8 +63,7 @@ struct Bench<'a> {
     progress: Progress,
     to_stdout: bool,
     lines: Option<Lines<Point>>,
-    /// Of the points that could not be measured.
-    worst: Option<Failure>,
+    left_out: LeftOut,
     measured: usize,
 }
 
@@ -93,7 +92,7 @@ impl Bench<'_> {
                 none => match OpenPlace::open(&scene, stop.lighting, &mut self.progress) {
                     Ok(place) => none.insert(place),
                     Err(failure) => {
-                        self.report(&stop.scene.display().to_string(), failure);
+                        self.report(&stop.scene.display().to_string(), &failure);
                         break;
                     }
                 },
@@ -114,7 +113,7 @@ impl Bench<'_> {
                 }
                 Err(failure) if failure.code == INTERRUPTED => {}
                 Err(failure) => {
-                    self.report(&what, failure);
+                    self.report(&what, &failure);
                     open = None;
                 }
             }
@@ -123,7 +122,7 @@ impl Bench<'_> {
             let (lines, around) = (&mut self.lines, (self.interrupt, &mut self.progress));
             let keep = |point: &Point| lines.as_mut().map_or(Ok(()), |lines| lines.renew(point.clone()));
             match sit_again(place, &mut points, &self.effort, around, keep) {
-                Err(failure) if failure.code != INTERRUPTED => self.report(&stop.scene.display().to_string(), failure),
+                Err(failure) if failure.code != INTERRUPTED => self.report(&stop.scene.display().to_string(), &failure),
                 _ => {}
             }
         }
@@ -152,11 +151,8 @@ impl Bench<'_> {
         if self.args.quiet { Ok(()) } else { output::print(&table_of(points)) }
     }
 
-    fn report(&mut self, what: &str, failure: Failure) {
+    fn report(&mut self, what: &str, failure: &Failure) {
         self.progress.clear();
-        log::warn!("{what} is left out: {failure}");
-        if self.worst.as_ref().is_none_or(|worst| worst.code < failure.code) {
-            self.worst = Some(failure);
-        }
+        self.left_out.add(what, failure);
     }
 }

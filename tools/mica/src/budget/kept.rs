@@ -26,6 +26,11 @@ impl Kept {
         self.cache.is_some()
     }
 
+    /// All points.
+    pub fn all(&self) -> &[Point] {
+        &self.points
+    }
+
     /// The point of a rung.
     pub fn point(&self, method: &MethodInfo, rung: &Rung) -> Option<&Point> {
         let is_set =

@@ -44,7 +44,8 @@ pub const FIGURES: [Figure; 13] = [
     },
     Figure {
         name: "variance ratio",
-        meaning: "Variance of the glints' luminance over the reference's: below 1 there is too little sparkle.",
+        meaning: "Variance of the glints' luminance within tiles of 16 x 16 pixels, over the reference's: below 1 there is too \
+                  little sparkle.",
         of: |point| error(point, |errors| Some(errors.variance_ratio)),
     },
     Figure {

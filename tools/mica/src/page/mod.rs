@@ -35,6 +35,12 @@ struct Plot {
 /// Files in `plots/` of other names are left alone, be they of places that the study had once or somebody's own.
 pub fn write(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let study = Study::read(folder)?;
+    if study.is_empty() {
+        let folder = folder.display();
+        return Err(Failure::bad_input(format!(
+            "{folder}: there is nothing of a study to draw; make one with `mica accuracy -o`, or name its folder"
+        )));
+    }
     let sections = Section::of(&study);
     let mut plots = Vec::new();
     let mut album = Album::new(folder);

@@ -71,6 +71,12 @@ impl Study {
         }
         Ok(study)
     }
+
+    /// Whether there is nothing to show, not even lines that could not be read.
+    pub fn is_empty(&self) -> bool {
+        let Self { points, references, exactness, papers, skipped } = self;
+        points.is_empty() && references.is_empty() && exactness.is_empty() && papers.is_empty() && skipped.is_empty()
+    }
 }
 
 /// Whether two lines were measured on the same device in the same way. A newer build replaces what an older one measured.

@@ -155,9 +155,10 @@ impl Reference {
 }
 
 impl ReferencePixels {
-    /// The errors of a picture; `base` is the same without glints.
-    pub fn errors(&self, picture: &[Rgb], base: &[Rgb], exposure: f32) -> Result<Errors, Failure> {
+    /// The errors of a picture; `base` is the same without glints. Without an exposure there is no FLIP.
+    pub fn errors(&self, picture: &[Rgb], base: &[Rgb], exposure: impl Into<Option<f32>>) -> Result<Errors, Failure> {
         let glints = difference(picture, base);
+        let exposure = exposure.into();
         let pixels = Pixels { size: self.size, glinting: &self.glinting, flakes: &self.flakes, exposure };
         let reference = mica_accuracy::Reference {
             radiance: Radiance { glints: &self.glints, whole: &self.whole },

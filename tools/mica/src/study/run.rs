@@ -2,6 +2,7 @@
 
 use super::Folder;
 use super::effort::Effort;
+use super::left_out::LeftOut;
 use super::measure::{measure, unmeasured};
 use super::place::OpenPlace;
 use super::plan::{self, Stop};
@@ -42,25 +43,25 @@ pub fn study(
         progress,
         folder,
         executor: None,
-        worst: None,
+        left_out: LeftOut::default(),
         measured: 0,
     };
     let finished = stops.iter().try_for_each(|stop| run.stop(stop));
-    let Run { measured, worst, folder, progress, .. } = run;
+    let Run { measured, left_out, folder, progress, .. } = run;
     progress.clear();
     if !args.quiet {
         let path = folder.path.join("points.jsonl");
         let all = folder.points.all.len();
         output::print(&format!("\n{}: {measured} points measured, {all} in all\n", path.display()))?;
     }
-    match (finished, worst) {
-        (Err(failure), _) if failure.code == INTERRUPTED => {
+    finished.map_err(|failure| match failure.code {
+        INTERRUPTED => {
             let message = format!("interrupted after {measured} points, which were kept; the same command goes on");
-            Err(Failure::with_code(INTERRUPTED, message))
+            Failure::with_code(INTERRUPTED, message)
         }
-        (Err(failure), _) | (Ok(()), Some(failure)) => Err(failure),
-        (Ok(()), None) => Ok(()),
-    }
+        _ => failure,
+    })?;
+    left_out.end()
 }
 
 /// How much work the command line asks for.
@@ -82,8 +83,7 @@ struct Run<'a> {
     folder: &'a mut Folder,
     /// That of the last place, if all went well there.
     executor: Option<Executor>,
-    /// Of the points that could not be measured.
-    worst: Option<Failure>,
+    left_out: LeftOut,
     measured: usize,
 }
 
@@ -103,9 +103,9 @@ impl Run<'_> {
                     self.show(&shown)?;
                     return Err(failure);
                 }
-                Err(Stopped::At(what, failure)) => self.report(&what, failure),
+                Err(Stopped::At(what, failure)) => self.report(&what, &failure),
                 Err(Stopped::Place(failure)) => {
-                    self.report(&stop.scene.display().to_string(), failure);
+                    self.report(&stop.scene.display().to_string(), &failure);
                     break;
                 }
             }
@@ -129,6 +129,11 @@ impl Run<'_> {
         let earlier = self.executor.take();
         let mut open = OpenPlace::open_on(earlier, &scene, stop.lighting, self.progress).map_err(Stopped::Place)?;
         let mut reference = None;
+        // Whoever looks at the study finds what its points were compared with, even where none of them is missing.
+        if let Some(lost) = self.folder.lost_reference(&open, self.effort) {
+            log::warn!("{}: it is lost or damaged, and rendered again", lost.display());
+            reference = Some(self.reference(&mut open)?);
+        }
         while let Some((method, rung)) = self.rungs.get(*next).copied() {
             self.check_interrupt()?;
             *next += 1;
@@ -195,12 +200,9 @@ impl Run<'_> {
         Ok(())
     }
 
-    fn report(&mut self, what: &str, failure: Failure) {
+    fn report(&mut self, what: &str, failure: &Failure) {
         self.progress.clear();
-        log::warn!("{what} is left out: {failure}");
-        if self.worst.as_ref().is_none_or(|worst| worst.code < failure.code) {
-            self.worst = Some(failure);
-        }
+        self.left_out.add(what, failure);
     }
 
     fn show(&mut self, points: &[Point]) -> Result<(), Failure> {

@@ -31,9 +31,9 @@ impl Default for Drift {
 }
 
 impl Drift {
-    /// The farthest that two sittings of any of the points lie apart.
+    /// How far sittings of one point lie apart for nine tenths of the points: a hitch is no drift.
     fn seen(points: &[Point]) -> Self {
-        let farthest = |of: fn(&[f64; 2]) -> f64| {
+        let apart = |of: fn(&[f64; 2]) -> f64| {
             let of_point = |point: &Point| {
                 let medians: Vec<f64> =
                     point.cost.sittings.iter().map(|rounds| median(rounds.iter().map(of))).collect();
@@ -41,9 +41,12 @@ impl Drift {
                 let greatest = medians.iter().copied().fold(0.0, f64::max);
                 (greatest - least) / median(medians.into_iter())
             };
-            points.iter().map(of_point).fold(LEAST_DRIFT, f64::max)
+            let mut ranges: Vec<f64> = points.iter().map(of_point).collect();
+            ranges.sort_by(f64::total_cmp);
+            let tenth = ranges.len() / 10;
+            ranges.iter().rev().nth(tenth).map_or(LEAST_DRIFT, |range| range.max(LEAST_DRIFT))
         };
-        Self { frame: farthest(with_glints), ratio: farthest(with_over_without) }
+        Self { frame: apart(with_glints), ratio: apart(with_over_without) }
     }
 }
 
@@ -109,4 +112,29 @@ fn with_glints([with, _]: &[f64; 2]) -> f64 {
 
 fn with_over_without([with, without]: &[f64; 2]) -> f64 {
     with / without
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cost(sittings: &[f64]) -> Cost {
+        let rounds = sittings.iter().map(|ratio| vec![[ratio * 1e6, 1e6]]).collect();
+        Cost { sittings: rounds, ..super::super::timing::nothing_yet() }
+    }
+
+    #[test]
+    fn a_spread_holds_every_round_and_what_sittings_differ_by() {
+        let mut alike = cost(&[2.0, 2.0, 2.2]);
+        settle(&mut alike, &Drift { frame: 0.3, ratio: 0.1 });
+        assert_eq!((alike.ratio.value, alike.frame.value, alike.glints.value), (2.0, 2e6, 1e6));
+        let ends = |of: mica_accuracy::Estimate| [of.low, of.high].map(|end| (end * 1e6).round() / 1e6);
+        assert_eq!(ends(alike.ratio), [1.8, 2.2]);
+        assert_eq!(ends(alike.frame), [1.4e6, 2.6e6]);
+        // A tenth of the frame by the ratio, and three tenths of itself by the frame.
+        assert_eq!(ends(alike.glints), [0.5e6, 1.5e6]);
+        let mut apart = cost(&[1.0, 2.0, 5.0]);
+        settle(&mut apart, &Drift::default());
+        assert_eq!(ends(apart.ratio), [1.0, 5.0]);
+    }
 }

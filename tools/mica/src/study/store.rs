@@ -152,14 +152,24 @@ impl Folder {
 
     /// The reference of a place, if one was kept that this machine rendered with this effort.
     pub fn reference(&self, open: &OpenPlace, effort: &Effort) -> Option<(ReferenceLine, ReferencePixels)> {
+        let line = self.reference_line(open, effort)?;
+        let bytes = fs::read(self.path.join(&line.pictures[1])).ok()?;
+        let pixels = reference_file::read(&bytes, &of(line))?;
+        Some((line.clone(), pixels))
+    }
+
+    /// The file of a reference that was kept once and cannot be read any more.
+    pub fn lost_reference(&self, open: &OpenPlace, effort: &Effort) -> Option<PathBuf> {
+        let line = self.reference_line(open, effort).filter(|_| self.reference(open, effort).is_none())?;
+        Some(self.path.join(&line.pictures[1]))
+    }
+
+    fn reference_line(&self, open: &OpenPlace, effort: &Effort) -> Option<&ReferenceLine> {
         let is_same = |line: &&ReferenceLine| {
             let same = line.place == open.place && line.machine == open.machine && line.content == open.content;
             same && line.effort == effort.of_reference()
         };
-        let line = self.references.all.iter().rev().find(is_same)?;
-        let bytes = fs::read(self.path.join(&line.pictures[1])).ok()?;
-        let pixels = reference_file::read(&bytes, &of(line))?;
-        Some((line.clone(), pixels))
+        self.references.all.iter().rev().find(is_same)
     }
 
     /// Keeps a reference: first its files, then the line that says they are there.

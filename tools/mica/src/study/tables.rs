@@ -44,14 +44,22 @@ pub fn of_place(points: &[Point]) -> String {
     text
 }
 
-/// A figure with half the width of its spread; a dash for what is not defined.
-fn with_spread(Estimate { value, low, high }: Estimate, factor: f64, places: usize) -> String {
+/// A figure with its spread: as one width where both sides are about as wide, else as both; a dash for what is not defined.
+fn with_spread(estimate: Estimate, factor: f64, places: usize) -> String {
+    let Estimate { value, low, high } = estimate.scaled(factor);
     if !value.is_finite() {
         return "-".to_owned();
     }
-    let half = (high - value).max(value - low) * factor;
-    let spread = if half.is_finite() { format!(" ± {half:.places$}") } else { String::new() };
-    format!("{:.places$}{spread}", value * factor)
+    let (above, below) = (high - value, value - low);
+    let (narrow, wide) = (above.min(below), above.max(below));
+    let spread = if !wide.is_finite() {
+        String::new()
+    } else if wide - narrow <= wide / 3.0 {
+        format!(" ± {wide:.places$}")
+    } else {
+        format!(" +{above:.places$}/-{below:.places$}")
+    };
+    format!("{value:.places$}{spread}")
 }
 
 #[cfg(test)]
@@ -59,9 +67,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn figures_stand_with_the_farther_end_of_their_spread() {
-        let estimate = Estimate { value: 2e6, low: 1.5e6, high: 2.1e6 };
-        assert_eq!(with_spread(estimate, 1e-6, 2), "2.00 ± 0.50");
+    fn figures_stand_with_both_sides_of_their_spread() {
+        let of = |low, high| with_spread(Estimate { value: 2e6, low, high }, 1e-6, 2);
+        assert_eq!([of(1.5e6, 2.5e6), of(1.5e6, 2.4e6)], ["2.00 ± 0.50"; 2]);
+        assert_eq!([of(1.5e6, 2.1e6), of(2e6, 2.3e6)], ["2.00 +0.10/-0.50", "2.00 +0.30/-0.00"]);
         assert_eq!(with_spread(Estimate::UNKNOWN, 1.0, 2), "-");
         assert_eq!(with_spread(Estimate { value: 1.0, ..Estimate::UNKNOWN }, 1.0, 1), "1.0");
     }

@@ -9,6 +9,7 @@ mod occlusion;
 mod oracle;
 mod render;
 mod report;
+mod stability;
 mod study;
 
 use serde_json::Value as Json;

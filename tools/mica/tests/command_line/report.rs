@@ -232,11 +232,22 @@ fn torn_lines_and_figures_that_are_no_numbers_leave_a_page_that_says_so() {
 }
 
 #[test]
-fn an_empty_study_is_a_page_and_a_folder_that_is_not_there_is_a_mistake() {
+fn a_folder_without_a_study_is_a_mistake_and_one_whose_lines_cannot_be_read_says_so() {
     let folder = tempfile::tempdir().expect("a temporary folder");
+    let refused = |path: &Path, what: &str| {
+        let error = failed_in_one_line(&run(&["accuracy", "--redraw", "-o", path.to_str().expect("a plain name")]), 2);
+        assert!(error.contains(what), "{error}");
+    };
+    refused(&folder.path().join("missing"), "no such folder");
+    refused(folder.path(), "nothing of a study");
+    std::fs::write(folder.path().join("points.jsonl"), "").expect("a file");
+    refused(folder.path(), "nothing of a study");
+    assert!(!folder.path().join("index.html").exists());
+    std::fs::write(folder.path().join("points.jsonl"), "{\"schema\":\"mica-point-0\"}\n").expect("a file");
     redraw(folder.path());
-    assert!(opened(folder.path(), "#nowhere/nothing").contains("Nothing has been measured yet."));
-    let missing = folder.path().join("missing");
-    let error = failed_in_one_line(&run(&["accuracy", "--redraw", "-o", missing.to_str().expect("a plain name")]), 2);
-    assert!(error.contains("missing"), "{error}");
+    let page = opened(folder.path(), "#nowhere/nothing");
+    assert!(
+        page.contains("Nothing has been measured yet.") && page.contains("1 line is left out of points.jsonl"),
+        "{page}"
+    );
 }

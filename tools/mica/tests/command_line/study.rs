@@ -147,6 +147,15 @@ fn what_changed_or_is_lost_is_measured_again_and_nothing_else() {
     std::fs::remove_file(made.join(points[1]["pictures"][0].as_str().expect("a path"))).expect("it was there");
     assert!(measured().contains("1 points measured, 2 in all"));
 
+    // The reference is there for whoever looks, even where every point is.
+    let reference = made.join(lines(&made, "references.jsonl")[1]["pictures"][1].as_str().expect("a path"));
+    let whole = std::fs::read(&reference).expect("a file");
+    for cut in [0, whole.len() / 2] {
+        std::fs::write(&reference, &whole[..cut]).expect("written");
+        assert!(measured().contains("0 points measured, 2 in all"));
+        assert!(std::fs::read(&reference).is_ok_and(|bytes| bytes == whole), "after {cut} bytes");
+    }
+
     let file = made.join("points.jsonl");
     let older = std::fs::read_to_string(&file).expect("lines").replace("mica-point-1", "mica-point-0");
     std::fs::write(&file, older).expect("written");
@@ -236,8 +245,11 @@ fn a_place_that_cannot_be_measured_is_said_and_the_others_go_on() {
     assert_eq!(output.status.code(), Some(2));
     let error = String::from_utf8_lossy(&output.stderr).into_owned();
     for part in ["sphere has no lights", "none.glb"] {
-        assert!(error.contains(part), "{error}");
+        assert!(error.lines().any(|line| line.starts_with("warning: ") && line.contains(part)), "{error}");
     }
+    // What was said is not said again.
+    let last = error.lines().last().unwrap_or_default();
+    assert!(last.starts_with("mica: ") && last.contains("left out") && !last.contains("lights"), "{error}");
     assert_eq!(points(folder.path(), "bench.jsonl").len(), 1);
 }
 

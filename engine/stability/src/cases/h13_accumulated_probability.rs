@@ -1,0 +1,8 @@
+//! H13. Chances accumulated over many lights.
+
+use crate::{Check, Laboratory, StabilityError};
+
+/// Measures it.
+pub fn measure(_: &mut Laboratory) -> Result<Vec<Check>, StabilityError> {
+    Ok(Vec::new())
+}

@@ -1,0 +1,8 @@
+//! H24. P near the edge of the cone.
+
+use crate::{Check, Laboratory, StabilityError};
+
+/// Measures it.
+pub fn measure(_: &mut Laboratory) -> Result<Vec<Check>, StabilityError> {
+    Ok(Vec::new())
+}

@@ -1,0 +1,31 @@
+//! `mica stability`: what it prints and writes. What the cases themselves find is tested with the whole program.
+
+use crate::{Json, failed_in_one_line, in_folder, json, run, succeeded};
+
+#[test]
+fn a_case_is_measured_printed_and_written() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = in_folder(folder.path(), "found.json");
+    let text = succeeded(run(&["stability", "h07", "--json", &path]));
+    for word in ["H07", "Small angles", "naive", "stable", "tolerance", "holds", "1 of 1 within tolerance"] {
+        assert!(text.contains(word), "{word} in {text}");
+    }
+    let found = json(&std::fs::read_to_string(&path).expect("it was written"));
+    assert_eq!((&found["schema"], &found["held"]), (&Json::from("mica-stability-1"), &Json::from(1)));
+    let case = &found["cases"][0];
+    assert_eq!((&case["id"], &case["holds"], &case["naive_fails"]), (&"H07".into(), &true.into(), &true.into()));
+    let check = &case["checks"][0];
+    let worst = check["stable"]["worst"].as_f64().expect("a number");
+    assert!(worst > 0.0 && worst <= check["tolerance"].as_f64().expect("a number"), "{check}");
+    assert!(case["inputs"].as_u64() > Some(1000), "{case}");
+    let printed = json(&succeeded(run(&["stability", "H07", "--json", "-"])));
+    assert_eq!(printed["cases"], found["cases"], "the same inputs, the same errors");
+}
+
+#[test]
+fn what_is_no_case_is_refused_in_one_line() {
+    for wrong in ["H45", "H00", "7", "angles"] {
+        let error = failed_in_one_line(&run(&["stability", wrong]), 2);
+        assert!(error.contains("H01 to H44"), "{error}");
+    }
+}
