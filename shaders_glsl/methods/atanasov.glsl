@@ -69,12 +69,9 @@ void test_flakes(FlakeNode node, uvec2 key) {
       vec3 normal = flake_normal(key, flake, slope_deviation);
       float weight = length(normal);
       vec3 m = normal / weight;
-      float o_m = dot(o, m);
-      vec3 mirrored = 2.0 * o_m * m - o;
       for (uint light = 0u; light < frame.light_count; ++light) {
         --steps_left;
-        vec3 apart = mirrored - directions[light];
-        bool hit = o_m > 0.0 && dot(apart, apart) <= 4.0 * sin2_half_gamma && dot(directions[light], m) > 0.0;
+        bool hit = reflects_into_cone(m, o, directions[light], sin2_half_gamma) && dot(directions[light], m) > 0.0;
         lit[light] += hit ? weight : 0.0;
       }
       if (frame.has_environment == 1u) {

@@ -6,6 +6,7 @@
 #include "shared/directions.glsl"
 #include "shared/hash.glsl"
 #include "shared/lobe_light.glsl"
+#include "shared/loop_budget.glsl"
 
 layout(push_constant) uniform Params {
   uint material; // Index of the material.
@@ -25,9 +26,8 @@ const int COARSEST = 31; // Beyond this level, of cells 2^16 squares wide, all i
 const float PRINTED_CELLS = 100.0; // So many cells of a bounding box are visited as published.
 const float EDGE_WEIGHT = 0.1353352832; // exp(-2), the weight at a footprint's edge.
 
-// Steps left to this invocation. One driver ends an invocation silently after 65,535 loop iterations, and counts those
-// of eight invocations that run as one vector together: the longest of them at every step.
-int steps_left = 7000;
+// Steps left to this invocation.
+int steps_left = STEPS_A_INVOCATION;
 
 // Density of slopes in the limit of many flakes, per unit of slope plane.
 float smooth_slopes(vec2 slope) {

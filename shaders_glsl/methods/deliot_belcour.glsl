@@ -62,7 +62,7 @@ float lit_share(Grid grid, float weight, vec2 uv, vec2 slope, float p) {
     uvec2 y = words_of(vertex.y);
     uint key = hash(x.x, x.y, hash(y.x, y.y, grid_key));
     float exponent = log_density + density_randomization * probit(unit_from(mixed(key + 1u)));
-    float n = min(area * exp(repaired == 1u ? min(exponent, 50.0) : clamp(exponent, 0.0, 50.0)), 1e30);
+    float n = flakes_in_cell(repaired == 1u ? exponent : max(exponent, 0.0), area);
     vec2 offset = vec2(unit_from(mixed(key + 2u)), unit_from(mixed(key + 3u)));
     vec2 at = slope + offset * float(DELIOT_BELCOUR_NOISE_SIZE);
     vec2 cell = floor(at);

@@ -4,6 +4,7 @@
 // flake mirrors, averaged over its cone. A pixel that is not finished goes on in the next pass from where it stopped.
 #include "shared/cone_means.glsl"
 #include "shared/flakes_in_footprint.glsl"
+#include "shared/footprint_area.glsl"
 #include "shared/lit_probability.glsl"
 #include "shared/microfacet.glsl"
 #include "shared/smooth_lobe.glsl"
@@ -105,7 +106,7 @@ vec3 glint_radiance(GlintSurface surface) {
   double sin2_half_gamma = packDouble2x32(uvec2(sin2_half_gamma_low, sin2_half_gamma_high));
   vec2 side_x = surface.uv_dx;
   vec2 side_y = surface.uv_dy;
-  float area = abs(side_x.x * side_y.y - side_x.y * side_y.x);
+  float area = footprint_area(side_x, side_y);
   FlakeSet set = FlakeSet(leaf_level, table_level, seed);
   bool lit_by_environment = frame.has_environment != 0u;
   bool begins = walker.state == WALK_AHEAD;

@@ -2,6 +2,7 @@
 //
 // Lights by the paper's BRDF; the environment by directions drawn as the paper draws them. One loop asks the tree for all of
 // them, so that it is compiled once.
+#include "shared/cells.glsl"
 #include "shared/glint_surface.glsl"
 #include "shared/jakob_tree.glsl"
 #include "shared/lit_probability.glsl"
@@ -44,7 +45,7 @@ vec3 glint_radiance(GlintSurface surface) {
   steps_left = int(steps);
   mat3 to_local = frame_about(surface.normal);
   vec3 o = surface.o * to_local;
-  vec2 within = surface.uv - floor(surface.uv);
+  vec2 within = within_cell(surface.uv);
   vec2 corner = within - 0.5 * (surface.uv_dx + surface.uv_dy);
   uint64_t flakes = uint64_t(flakes_high) << 32 | uint64_t(flakes_low);
   JakobFootprint footprint = jakob_footprint(flakes, corner, surface.uv_dx, surface.uv_dy);
@@ -84,9 +85,9 @@ vec3 glint_radiance(GlintSurface surface) {
     float share = (float(found.counted) + found.expected) / all;
     for (bool once = found.spent && mode == JAKOB_BOTH; once; once = false) {
       // The walk told too little: what is expected of the footprint stands, of flakes with density D / S_D.
-      vec3 h = normalize(i + o);
+      vec3 h = half_vector(i, o);
       float probability = lit_probability(i, o, sin_half_gamma * sin_half_gamma, alpha);
-      share = footprint.area * probability / (h.z * density_integral);
+      share = h.z > 0.0 ? footprint.area * probability / (h.z * density_integral) : 0.0;
     }
     if (places) {
       share_of_places = share;

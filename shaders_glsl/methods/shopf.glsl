@@ -2,6 +2,7 @@
 //
 // What is known of it: f = fract(0.7 x + 9 noise(0.04 x) + 0.1 v), glitter = clamp(1 - 7 sum f (1 - f)), times a broad
 // specular lobe; x in object space, v the vector to the eye. What is not is decided in the method's Rust file.
+#include "shared/cells.glsl"
 #include "shared/hash.glsl"
 #include "shared/lobe_light.glsl"
 #include "shared/texture_density.glsl"
@@ -22,7 +23,6 @@ const float SHARPNESS = 7.0; // Of the sparkles about the grid's corners.
 const float MEAN_GLITTER = 0.0011793331; // Mean over a cell of clamp(1 - 7 sum f (1 - f)), by quadrature.
 const float CORNERS_A_FACE = 0.29; // Corners of the grid that shine through a cell's face: their mean width.
 const float NOISE_FREQUENCY = 0.0571428571; // Of the noise, in periods a cell: 0.04 / 0.7.
-const float LARGEST_INDEX = 1073741824.0; // Cells are told apart to this index, 2^30.
 const float FADED_FROM = 65536.0; // Cells from the origin from which the repaired grid fades,
 const float FADED_TO = 262144.0; // and where it is gone: 32 floats a cell are left there.
 
@@ -33,7 +33,7 @@ float glitter;
 float value_noise(vec3 place) {
   vec3 base = floor(place);
   vec3 part = place - base;
-  ivec3 index = ivec3(clamp(base, -LARGEST_INDEX, LARGEST_INDEX));
+  ivec3 index = cell_of(place);
   float sum = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
     ivec3 step = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);

@@ -99,7 +99,7 @@ void visit(FlakeNode node) {
     } else {
       steps += count;
       for (uint particle = 0u; particle < uint(count); ++particle) {
-        accepted += float(hash(particle, word)) * 2.3283064e-10 < probability ? 1.0 : 0.0;
+        accepted += rare_unit_from(hash(particle, word)) < probability ? 1.0 : 0.0;
       }
     }
     lit[source] += share * accepted;

@@ -4,8 +4,11 @@
 // depend on the light; one lambda a flake, so that those with a small one never go out; scales switched at 4 and 64
 // flakes in the footprint, whether lit or not; flakes without a place inside their leaf, so that magnified leaves are
 // squares.
+#include "shared/cells.glsl"
 #include "shared/footprint.glsl"
+#include "shared/footprint_area.glsl"
 #include "shared/hash.glsl"
+#include "shared/loop_budget.glsl"
 #include "shared/microfacet.glsl"
 #include "shared/smooth_lobe.glsl"
 #include "shared/wang2020_tables.glsl"
@@ -30,9 +33,8 @@ const float ALL = 2.0; // A threshold that every flake is below.
 const float MAX_CUT_CELLS = 48.0; // A footprint over more cells than this is cut at a coarser level.
 const uint MAX_LEAF_FLAKES = 128u; // A leaf with more flakes than this contributes its expectation.
 
-// Steps left to this invocation. One driver ends an invocation silently after 65,535 loop iterations, and counts those of
-// eight invocations that run as one vector together: the longest of them at every step.
-int steps_left = 7000;
+// Steps left to this invocation.
+int steps_left = STEPS_A_INVOCATION;
 
 // Bits of x and y in turn: the place of a node in its level.
 uint interleaved(uvec2 cell) {
@@ -104,7 +106,7 @@ float flakes_below(float threshold, vec2 corner, vec2 side_x, vec2 side_y, float
         uint count = uint(node.y);
         for (uint flake = 0u; flake < count; ++flake) {
           --steps_left;
-          found += unit_from(hash(flake, at, seed)) < threshold ? share : 0.0;
+          found += rare_unit_from(hash(flake, at, seed)) < threshold ? share : 0.0;
         }
       }
     }
@@ -155,14 +157,14 @@ vec3 glint_radiance(GlintSurface surface) {
   mat3 to_local = frame_about(n);
   vec3 o_local = o * to_local;
 
-  float area = abs(surface.uv_dx.x * surface.uv_dy.y - surface.uv_dx.y * surface.uv_dy.x);
+  float area = footprint_area(surface.uv_dx, surface.uv_dy);
   float expected = area * flakes;
   // Written so that a footprint that is no number is macro too, where the area does not matter.
   bool macro = !(expected <= macro_above) || area < 1e-18;
   bool micro = !macro && expected < micro_below;
   vec2 side_x = surface.uv_dx;
   vec2 side_y = surface.uv_dy;
-  vec2 wrapped = surface.uv - floor(surface.uv);
+  vec2 wrapped = within_cell(surface.uv);
   vec2 corner = wrapped - 0.5 * (side_x + side_y);
 
   // Source 0 is the environment, the others are the lights. `each` is what a flake adds if it is lit for sure, before the

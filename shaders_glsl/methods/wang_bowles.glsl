@@ -4,6 +4,7 @@
 // division by 0 is no sparkle; repaired, it does not come to that.
 #include "shared/hash.glsl"
 #include "shared/lobe_light.glsl"
+#include "shared/sparkle_grid.glsl"
 #include "shared/texture_density.glsl"
 
 layout(push_constant) uniform Params {
@@ -43,10 +44,9 @@ float sparkle_at(GlintSurface surface) {
   if (round_on_screen == 1u) {
     flattened = abs(facing);
     if (repaired == 1u) {
-      // (|c| - 1) / |tangent|^2 is -1 / (1 + |c|): no division by 0. Where a sparkle would reach past the eight nearest
-      // cells, it is stretched no further.
+      // Where a sparkle would reach past the eight nearest cells, it is stretched no further.
       float least = min(radius / LONGEST_REACH, 1.0);
-      along_tangent = flattened >= least ? -1.0 / (1.0 + flattened) : (least - 1.0) / (1.0 - facing * facing);
+      along_tangent = sparkle_stretch(facing, least);
       flattened = max(flattened, least);
     } else {
       float tangent2 = dot(tangent, tangent);
@@ -70,20 +70,16 @@ float sparkle_at(GlintSurface surface) {
       level = max(level, 2);
       weight = upper == 1u ? step - lower : 1.0 - (step - lower);
     }
-    float level_z = 0.1 * ldexp(1.0, level) - 0.2;
-    level_z = repaired == 1u ? max(level_z, 0.2) : level_z;
-    vec3 turned = fract(surface.o * level_z);
-    float turned2 = dot(turned, turned);
-    if (repaired == 1u && turned2 < 1e-8) {
-      turned = surface.o;
-      turned2 = 1.0;
-    }
     // As printed the nearest level is 0, where the grid would be infinitely fine.
-    if (weight > 0.0 && level_z > 0.0 && turned2 > 0.0) {
+    float level_z = repaired == 1u ? sparkle_distance(level) : 0.1 * ldexp(1.0, level) - 0.2;
+    vec3 turned = fract(surface.o * level_z);
+    bool turns = repaired == 1u || dot(turned, turned) > 0.0;
+    if (weight > 0.0 && level_z > 0.0 && turns) {
+      vec3 shift = repaired == 1u ? sparkle_shift(surface.o, level_z) : turned * inversesqrt(dot(turned, turned));
       float cells_a_metre = scale * 0.12 / (level_z * unit);
       // At even steps between two cells: a plane along one grid, which may pass between sparkles, does not along the next.
       vec3 offset = vec3(float(layer) / float(layers));
-      vec3 place = cells_a_metre * surface.position + twinkle * inversesqrt(turned2) * turned + offset;
+      vec3 place = cells_a_metre * surface.position + twinkle * shift + offset;
       vec3 corner_of_cell = vec3(float(corner & 1u), float(corner >> 1 & 1u), float(corner >> 2 & 1u));
       vec3 cell = repaired == 1u ? floor(place - 0.5) + corner_of_cell : floor(place);
       ivec3 index = ivec3(clamp(cell, -LARGEST_INDEX, LARGEST_INDEX));

@@ -4,9 +4,12 @@
 // flake in a cell can still give a whole one; the Gaussian branch lacks a factor sqrt 2; two grids are blended linearly,
 // which takes variance away; the light's cone adds a floor to the lobe. The sine hash is an integer one here.
 #include "shared/blended_count.glsl"
+#include "shared/cells.glsl"
 #include "shared/directions.glsl"
+#include "shared/footprint_area.glsl"
 #include "shared/hash.glsl"
 #include "shared/lobe_light.glsl"
+#include "shared/loop_budget.glsl"
 
 layout(push_constant) uniform Params {
   uint material; // Index of the material.
@@ -22,10 +25,9 @@ layout(push_constant) uniform Params {
 };
 
 const int SHORT_CELLS = 4; // Cells walked across the long axis.
-const float LARGEST_INDEX = 1073741824.0; // Cells are told apart to this index, 2^30.
 
-// Steps left to this invocation: loops are not endless on every driver (see wang2020.glsl).
-int steps_left = 7000;
+// Steps left to this invocation.
+int steps_left = STEPS_A_INVOCATION;
 
 // The footprint as the grids are walked: of the pixel's own area, one side along the pixel's longer derivative, the other
 // along an axis of texture space.
@@ -45,7 +47,7 @@ Strip strip_of(vec2 dx, vec2 dy) {
   vec2 y = found.along == 1u ? dy.yx : dy;
   vec2 side = abs(x.x) >= abs(y.x) ? x : y;
   found.extent = abs(side.x);
-  found.width = abs(x.x * y.y - x.y * y.x) / found.extent;
+  found.width = footprint_area(x, y) / found.extent;
   found.skew = side.y / side.x;
   return found;
 }
@@ -102,11 +104,11 @@ float glint_density(GlintSurface surface, vec3 i, vec3 h) {
     float overlap = min(across + 1.0, across_middle + across_reach) - max(across, across_middle - across_reach);
     float weight = grid_weight[grid] * max(to - from, 0.0) * max(overlap, 0.0);
     if (weight > 0.0) {
-      ivec2 index = ivec2(clamp(vec2(along, across), -LARGEST_INDEX, LARGEST_INDEX));
+      ivec2 index = cell_of(vec2(along, across));
       index = strip.along == 1u ? index.yx : index;
       uint place = hash(uint(odd_part(index.x)), uint(odd_part(index.y)), seed);
       vec2 shift = vec2(unit_from(hash(place, 1u)), unit_from(hash(place, 2u)));
-      ivec2 cone_index = ivec2(floor(lobe_place + shift));
+      ivec2 cone_index = cell_of(lobe_place + shift);
       uint key = hash(uint(cone_index.x), uint(cone_index.y), place);
       float flakes = density * cell * cell;
       // erfinv of a number uniform in (-1, 1) is a normal number over sqrt 2.

@@ -67,16 +67,18 @@ vec2 bvh_box_span(BvhRay ray, vec3 lower, vec3 upper, float t_min, float t_max) 
   return vec2(max(max(enter.x, enter.y), max(enter.z, t_min)), last);
 }
 
-// Tests one triangle: true where it is met between t_min and hit.t, which then moves there. The test of Woop, Benthin
+// Tests one triangle: true where it is met between t_min and both hit.t, which then moves there, and t_max. The test of Woop, Benthin
 // and Wald 2013, "Watertight ray/triangle intersection": the ray becomes the z axis, and three 2D edge functions tell
 // its side of each edge. Two triangles that share an edge compute its function from the same two products, so they
 // agree to the bit as long as nothing is contracted; rounding is monotone, so a sign is right or the value is 0, and 0
 // counts for both. That closes the seam without the paper's recourse to doubles.
 //
 // Each function is off by up to 6 units of rounding of its products, which moves t by as much of the corner's depth as that
-// is of the triangle's area: little, unless it is a needle. A hit no farther than that is none, since it may as well lie
-// behind the origin, on the very triangle that the ray left.
-bool bvh_meets(BvhRay ray, BvhTriangle triangle, float t_min, inout RayHit hit) {
+// is of the triangle's area: little, unless it is a needle, or huge. A hit no farther than that is none, since it may as well
+// lie behind the origin, on the very triangle that the ray left. Nor is one that may lie behind the end, where a lamp is: there
+// 2^-17 of the way is left out, since ends are moved off what lies there by more (offset_origin), and small errors are
+// covered by that.
+bool bvh_meets(BvhRay ray, BvhTriangle triangle, float t_min, float t_max, inout RayHit hit) {
   vec3 a = bvh_turned(triangle.a - ray.origin, ray.axis);
   vec3 b = bvh_turned(triangle.b - ray.origin, ray.axis);
   vec3 c = bvh_turned(triangle.c - ray.origin, ray.axis);
@@ -87,16 +89,18 @@ bool bvh_meets(BvhRay ray, BvhTriangle triangle, float t_min, inout RayHit hit) 
   precise float v = a_sheared.x * c_sheared.y - a_sheared.y * c_sheared.x;
   precise float w = b_sheared.x * a_sheared.y - b_sheared.y * a_sheared.x;
   precise float doubled_area = u + v + w;
-  precise float t = (u * a.z + v * b.z + w * c.z) * ray.shear.z / doubled_area;
+  // The quotient first: a depth, which is in the range of floats whatever the length of the direction makes of it.
+  precise float t = (u * a.z + v * b.z + w * c.z) / doubled_area * ray.shear.z;
   vec3 sizes = vec3(
     dot(abs(c_sheared), abs(b_sheared.yx)),
     dot(abs(a_sheared), abs(c_sheared.yx)),
     dot(abs(b_sheared), abs(a_sheared.yx))
   );
-  float t_error = 3.5e-7 * dot(sizes, abs(vec3(a.z, b.z, c.z))) * abs(ray.shear.z) / abs(doubled_area);
+  float t_error = 3.5e-7 * dot(sizes, abs(vec3(a.z, b.z, c.z))) / abs(doubled_area) * abs(ray.shear.z);
   bool inside = min(u, min(v, w)) >= 0.0 || max(u, max(v, w)) <= 0.0;
   // Seen edge-on, the area is 0 and so is every edge function.
-  if (!inside || doubled_area == 0.0 || !(t > max(t_min, t_error) && t < hit.t)) {
+  bool before_end = t < hit.t && t + max(t_error - 7.6e-6 * t_max, 0.0) < t_max;
+  if (!inside || doubled_area == 0.0 || !(t > max(t_min, t_error) && before_end)) {
     return false;
   }
   hit.t = t;
@@ -140,7 +144,7 @@ bool bvh_walk(vec3 origin, vec3 direction, float t_min, float t_max, bool any_wi
       --bvh_steps_left;
       if (triangle < triangles_end) {
         RayHit met = hit;
-        bool blocks = bvh_meets(ray, bvh_triangles[triangle], t_min, met);
+        bool blocks = bvh_meets(ray, bvh_triangles[triangle], t_min, t_max, met);
 #ifdef ALPHA_MASKS
         // A loop, as some drivers execute branches always.
         for (bool asks = blocks; asks; asks = false) {

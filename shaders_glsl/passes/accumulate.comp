@@ -2,6 +2,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/frame.glsl"
+#include "shared/running_mean.glsl"
 #extension GL_EXT_samplerless_texture_functions : require
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -19,8 +20,7 @@ void main() {
   ivec2 at = ivec2(pixel);
   vec4 value = texelFetch(radiance, at, 0);
   if (earlier > 0u) {
-    vec4 before = imageLoad(mean, at);
-    value = before + (value - before) / float(earlier + 1u);
+    value = running_mean(imageLoad(mean, at), value, earlier);
   }
   imageStore(mean, at, value);
 }

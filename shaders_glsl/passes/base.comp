@@ -32,14 +32,12 @@ struct Lobe {
 };
 
 vec3 lobe_under_light(Lobe lobe, vec3 n, vec3 i, vec3 o) {
-  vec3 sum = i + o;
-  float length2 = dot(sum, sum);
+  vec3 h = half_vector(i, o);
   float i_n = dot(i, n);
   float o_n = dot(o, n);
-  if (length2 < 1e-12 || i_n <= 0.0 || o_n <= 0.0) {
+  if (h == vec3(0.0) || i_n <= 0.0 || o_n <= 0.0) {
     return vec3(0.0);
   }
-  vec3 h = sum * inversesqrt(length2);
   float d = ggx_d(h, n, lobe.alpha);
   float shadowing = ggx_g1_over_cosine(i_n, lobe.alpha) * ggx_g1_over_cosine(o_n, lobe.alpha);
   return schlick(lobe.f0, half_vector_cosine(i, o)) * (0.25 * d * shadowing);

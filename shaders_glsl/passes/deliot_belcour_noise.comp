@@ -6,6 +6,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "shared/constants.glsl"
 #include "shared/deliot_belcour_noise.glsl"
+#include "shared/half_float.glsl"
 #include "shared/hash.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -21,7 +22,7 @@ uint noise_of(uvec2 cell) {
   // Box and Muller 1958.
   float radius = sqrt(-2.0 * log(unit_from(mixed(key + 2u))));
   float normal_number = radius * cos(2.0 * PI * unit_from(mixed(key + 3u)));
-  return packHalf2x16(vec2(normal_number, uniform_number));
+  return packed_halves(vec2(normal_number, uniform_number));
 }
 
 void main() {

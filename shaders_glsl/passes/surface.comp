@@ -8,6 +8,7 @@
 #include "shared/frame.glsl"
 #include "shared/materials.glsl"
 #include "shared/directions.glsl"
+#include "shared/texture_place.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 12) uniform utexture2D ids;
@@ -78,13 +79,15 @@ void main() {
   vec2 weights_dy = vec2(dot(gradient1, point_dy), dot(gradient2, point_dy));
 
   vec4 uv0 = vec4(0.0);
-  vec4 uv_edge1 = vec4(0.0);
-  vec4 uv_edge2 = vec4(0.0);
+  vec4 uv1 = vec4(0.0);
+  vec4 uv2 = vec4(0.0);
   if ((instance.flags & INSTANCE_HAS_UV) != 0u) {
     uv0 = uvs[corners.x];
-    uv_edge1 = uvs[corners.y] - uv0;
-    uv_edge2 = uvs[corners.z] - uv0;
+    uv1 = uvs[corners.y];
+    uv2 = uvs[corners.z];
   }
+  vec4 uv_edge1 = uv1 - uv0;
+  vec4 uv_edge2 = uv2 - uv0;
   vec4 uv_here = uv0 + weights.x * uv_edge1 + weights.y * uv_edge2;
   vec4 uv_dx = weights_dx.x * uv_edge1 + weights_dx.y * uv_edge2;
   vec4 uv_dy = weights_dy.x * uv_edge1 + weights_dy.y * uv_edge2;
@@ -119,15 +122,10 @@ void main() {
     vec4 t1 = tangents[corners.y];
     vec4 t2 = tangents[corners.z];
     vec3 tangent = scene_vector(instance, interpolate(t0.xyz, t1.xyz, t2.xyz, barycentric));
-    tangent -= shading * dot(shading, tangent);
-    if (dot(tangent, tangent) > 1e-20) {
-      tangent = normalize(tangent);
-      float handedness = t0.w * ((instance.flags & INSTANCE_MIRRORED) != 0u ? -1.0 : 1.0);
-      vec3 bitangent = handedness * cross(shading, tangent);
-      vec3 bump = sampled[TEXTURE_NORMAL].xyz * 2.0 - 1.0;
-      bump.xy *= material.emissive.w;
-      shading = normalize(mat3(tangent, bitangent, shading) * bump);
-    }
+    float handedness = t0.w * ((instance.flags & INSTANCE_MIRRORED) != 0u ? -1.0 : 1.0);
+    vec3 bump = sampled[TEXTURE_NORMAL].xyz * 2.0 - 1.0;
+    bump.xy *= material.emissive.w;
+    shading = normalize(frame_along(shading, tangent, handedness) * bump);
   }
   shading = back ? -shading : shading;
   // A shading normal that turns away from the viewer is bent back to the silhouette: nothing can be seen from behind.
@@ -165,7 +163,14 @@ void main() {
   vec2 octahedral = octahedral_from(geometric);
   imageStore(position, at, vec4(point, octahedral.x));
   imageStore(normal, at, vec4(shading, octahedral.y));
-  imageStore(uv, at, vec4(uv_scale * (second_set ? uv_here.zw : uv_here.xy), coat));
+  vec2 flakes_at = texture_place(
+    uv_scale * (second_set ? uv0.zw : uv0.xy),
+    uv_scale * (second_set ? uv1.zw : uv1.xy),
+    uv_scale * (second_set ? uv2.zw : uv2.xy),
+    weights,
+    (material.flags & MATERIAL_GLINT_REPEATS) != 0u
+  );
+  imageStore(uv, at, vec4(flakes_at, coat));
   imageStore(footprint, at, uv_scale * vec4(second_set ? uv_dx.zw : uv_dx.xy, second_set ? uv_dy.zw : uv_dy.xy));
   imageStore(diffuse, at, vec4(scattered, clamp(roughness, 0.0, 1.0)));
   imageStore(specular, at, vec4(f0, weight));

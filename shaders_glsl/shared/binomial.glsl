@@ -1,22 +1,12 @@
 // Counts of successes, drawn by inversion: from one random word, the more the likelier success is.
 #ifndef BINOMIAL_GLSL
 #define BINOMIAL_GLSL
+#include "shared/chances.glsl"
+#include "shared/hash.glsl"
 
 const float INVERTED_BELOW = 16.0; // Means below this are inverted step by step, others by a corrected normal.
 const int MOST_INVERSION_STEPS = 64; // A mean of 16 stays below this but once in 1e18.
-
-// log(1 - p) for 0 <= p <= 1/2; 1 - p would lose the digits of a small p.
-float log_one_minus(float p) {
-  float s = -p / (2.0 - p);
-  float z = s * s;
-  return 2.0 * s * (1.0 + z * (1.0 / 3.0 + z * (1.0 / 5.0 + z * (1.0 / 7.0 + z * (1.0 / 9.0 + z / 11.0)))));
-}
-
-// 1 - exp(x) for x <= 0 without cancellation near 0.
-float one_minus_exp(float x) {
-  float series = 1.0 + x * (0.5 + x * (1.0 / 6.0 + x * (1.0 / 24.0 + x * (1.0 / 120.0 + x / 720.0))));
-  return x > -0.3 ? -x * series : 1.0 - exp(x);
-}
+const float LEAST_MASS = 1e-10; // Beyond the mean, a count less probable than this is the last: no word is so rare.
 
 // The standard normal number that is exceeded with probability v (Giles 2010, the single-precision fit).
 float normal_exceeded(float v) {
@@ -59,16 +49,20 @@ float binomial_steps(float n, float p) {
 float binomial(float n, float p, uint word) {
   bool mirrored = p > 0.5;
   float q = mirrored ? max(1.0 - p, 0.0) : p;
-  float v = (float(mirrored ? ~word : word) + 0.5) * 2.3283064e-10;
+  float v = rare_unit_from(mirrored ? ~word : word);
   float mean = n * q;
   float count = 0.0;
   float log_none = n * log_one_minus(q);
   if (mean < INVERTED_BELOW) {
-    // The probabilities of `count` successes and of more.
+    // The probabilities of `count` successes and of more. What is left of the latter by subtraction is rounding where it is
+    // below 1e-7: the former, a product, then ends the loop.
     float exactly = exp(log_none);
     float tail = one_minus_exp(log_none);
     float odds = q / (1.0 - q);
     for (int step = 0; step < MOST_INVERSION_STEPS && v < tail && count < n; ++step) {
+      if (count > mean && exactly < LEAST_MASS) {
+        break;
+      }
       count += 1.0;
       exactly *= odds * (n - count + 1.0) / count;
       tail -= exactly;
@@ -84,7 +78,7 @@ float binomial(float n, float p, uint word) {
 float binomial_without_loop(float n, float p, uint word) {
   bool mirrored = p > 0.5;
   float q = mirrored ? max(1.0 - p, 0.0) : p;
-  float v = (float(mirrored ? ~word : word) + 0.5) * 2.3283064e-10;
+  float v = rare_unit_from(mirrored ? ~word : word);
   float mean = n * q;
   float log_none = n * log_one_minus(q);
   float odds = q / (1.0 - q);

@@ -1,25 +1,12 @@
 // Counts of successes by inversion between two tabulated probabilities, or by a normal number (Zirr and Kaplanyan 2016).
 #ifndef BLENDED_COUNT_GLSL
 #define BLENDED_COUNT_GLSL
+#include "shared/chances.glsl"
 #include "shared/constants.glsl"
 #include "shared/hash.glsl"
 
 const float BLENDED_BELOW = 5.0; // Expected successes above which a normal number stands for the count.
 const int MOST_BLENDED_COUNT = 17; // The greatest count by inversion.
-
-// ln(1 - p) without the digits that 1 - p loses.
-float log_of_rest(float p) {
-  float s = p / (p - 2.0);
-  float z = s * s;
-  float series = 1.0 + z * (1.0 / 3.0 + z * (0.2 + z * (1.0 / 7.0 + z * (1.0 / 9.0 + z / 11.0))));
-  return p < 0.4 ? 2.0 * s * series : log(1.0 - p);
-}
-
-// 1 - exp(x) for x <= 0.
-float rest_of_exponential(float x) {
-  float series = 1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * (1.0 + x / 7.0)))));
-  return x > -0.5 ? -x * series : 1.0 - exp(x);
-}
 
 // A normal number of mean 0 and variance 1 (Box and Muller 1958).
 float normal_from(uint key) {
@@ -42,8 +29,8 @@ float blended_count(float n, float p, uint key, bool root_two, inout int steps_l
   vec2 odds = ends / (1.0 - ends);
   // P(K = k) and P(K > k) from k = 0 on; a number below P(K > k) means more than k.
   vec2 mass = exp(logs);
-  vec2 beyond = vec2(rest_of_exponential(logs.x), rest_of_exponential(logs.y));
-  float v = (float(hash(key, 7u)) + 0.5) * (1.0 / 4294967296.0);
+  vec2 beyond = vec2(one_minus_exp(logs.x), one_minus_exp(logs.y));
+  float v = rare_unit_from(hash(key, 7u));
   vec2 count = vec2(0.0);
   for (int k = 0; k < MOST_BLENDED_COUNT && float(k) < n && any(lessThan(vec2(v), beyond)) && steps_left > 0; ++k) {
     --steps_left;

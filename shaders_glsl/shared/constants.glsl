@@ -12,6 +12,7 @@ const uint MATERIAL_ALPHA_MASK = 2u; // Holes where alpha is below the cutoff.
 const uint MATERIAL_UNLIT = 4u; // Shows its base colour and nothing else.
 const uint MATERIAL_GLINTS = 8u; // Its specular lobe is made of flakes.
 const uint MATERIAL_NORMAL_MAP = 16u; // Has a texture of normals.
+const uint MATERIAL_GLINT_REPEATS = 32u; // Its flakes are the same in each square of texture.
 const uint INSTANCE_MIRRORED = 1u; // Its transform changes handedness.
 const uint INSTANCE_HAS_TANGENTS = 2u; // Its mesh has tangents.
 const uint INSTANCE_HAS_UV = 4u; // Its mesh has texture coordinates.

@@ -7,6 +7,7 @@
 #define FLAKE_SET_GLSL
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #include "shared/hash.glsl"
+#include "shared/integer_edges.glsl"
 
 const uint FLAKES_A_LEAF = 4u; // Leaves are on the first level where there are at most so many flakes a node on average.
 const uint EXACT_HALVING = 64u; // Up to so many flakes are parted by a bit each, more by a rounded normal.
@@ -22,7 +23,7 @@ uint draw(uvec2 key, uint index) {
   return mixed(key.x + mixed(key.y + index));
 }
 
-// -ln(word / 2^32) within 1e-7 relative, 0 taken as 1: no division, no library function.
+// -ln(word / 2^32) of the upper 24 bits of any word within 2e-7 relative, 0 taken as 1: no division, no library function.
 float minus_log(uint word) {
   uint bits = max(word, 1u);
   int exponent = findMSB(bits);
@@ -48,7 +49,7 @@ float minus_log(uint word) {
   return max(result, 0.0);
 }
 
-// 1 / sqrt(x) for positive normal x: four steps of Newton from the exponent halved.
+// 1 / sqrt(x) for positive normal x within 2.4e-7 relative: four steps of Newton from the exponent halved.
 float inverse_root(float x) {
   precise float y = uintBitsToFloat(0x5f3759dfu - (floatBitsToUint(x) >> 1));
   precise float half_x = 0.5 * x;
@@ -89,8 +90,8 @@ vec2 normal_pair(uint radius_word, uint angle_word) {
 uint64_t half_of(uint64_t n, uint first_word, uint second_word) {
   if (n <= uint64_t(EXACT_HALVING)) {
     uint count = uint(n);
-    uint low = count >= 32u ? 0xffffffffu : (1u << count) - 1u;
-    uint high = count <= 32u ? 0u : (count >= 64u ? 0xffffffffu : (1u << (count - 32u)) - 1u);
+    uint low = low_bits(count);
+    uint high = low_bits(max(count, 32u) - 32u);
     return uint64_t(bitCount(first_word & low) + bitCount(second_word & high));
   }
   precise float variance = 0.25 * float(n) - 0.083333336;

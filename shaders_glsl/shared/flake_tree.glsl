@@ -2,9 +2,12 @@
 // caller chooses.
 #ifndef FLAKE_TREE_GLSL
 #define FLAKE_TREE_GLSL
+#include "shared/exact_product.glsl"
+#include "shared/cells.glsl"
 #include "shared/flake_set.glsl"
 #include "shared/footprint.glsl"
 #include "shared/glint_surface.glsl"
+#include "shared/loop_budget.glsl"
 
 const uint TREE_LEVELS = 20u; // The deepest is level 19, that of the leaves of 1e12 flakes.
 
@@ -30,9 +33,8 @@ struct FlakeNode {
   bool whole; // It lies in the footprint.
 };
 
-// Steps left to this invocation. One driver ends an invocation silently after 65,535 loop iterations, and counts those of
-// eight invocations that run as one vector together.
-int steps_left = 7000;
+// Steps left to this invocation.
+int steps_left = STEPS_A_INVOCATION;
 
 // What the method makes of a node at the end of the traversal.
 void visit(FlakeNode node);
@@ -41,12 +43,12 @@ Footprint footprint_of(GlintSurface surface) {
   Footprint footprint;
   footprint.side_x = surface.uv_dx;
   footprint.side_y = surface.uv_dy;
-  footprint.corner = surface.uv - floor(surface.uv) - 0.5 * (surface.uv_dx + surface.uv_dy);
+  vec2 middle = within_cell(surface.uv);
+  footprint.corner = middle - 0.5 * (surface.uv_dx + surface.uv_dy);
   vec2 reach = 0.5 * (abs(surface.uv_dx) + abs(surface.uv_dy));
-  vec2 middle = surface.uv - floor(surface.uv);
   footprint.low = middle - reach;
   footprint.high = middle + reach;
-  float determinant = surface.uv_dx.x * surface.uv_dy.y - surface.uv_dx.y * surface.uv_dy.x;
+  float determinant = determinant_of(surface.uv_dx.x, surface.uv_dx.y, surface.uv_dy.x, surface.uv_dy.y);
   footprint.area = abs(determinant);
   footprint.along_x = vec2(surface.uv_dy.y, -surface.uv_dy.x) / determinant;
   footprint.along_y = vec2(-surface.uv_dx.y, surface.uv_dx.x) / determinant;

@@ -12,6 +12,7 @@
 #ifndef FLAKES_IN_FOOTPRINT_GLSL
 #define FLAKES_IN_FOOTPRINT_GLSL
 #include "shared/flake_set.glsl"
+#include "shared/footprint_area.glsl"
 
 layout(std430, binding = 55) readonly buffer FlakeCounts { uvec2 flake_counts[]; }; // Low and high word, row by row.
 
@@ -257,7 +258,7 @@ bool flake_is_lit(vec3 normal, vec3 i, vec3 o, double sin2_half_gamma) {
 float flake_walk_steps(FlakeSet set, vec2 side_x, vec2 side_y, float flakes, float tests) {
   float leaves = float(1u << set.leaf_level);
   vec2 cells = (abs(side_x) + abs(side_y)) * leaves;
-  float area = abs(side_x.x * side_y.y - side_x.y * side_y.x) * leaves * leaves;
+  float area = footprint_area(side_x, side_y) * leaves * leaves;
   float met = area + 2.0 * cells.x + 4.0 * cells.y + 16.0;
   float a_leaf = flakes / (leaves * leaves);
   float looked_at = met * a_leaf;

@@ -6,6 +6,7 @@
 #ifndef FOOTPRINT_COUNT_GLSL
 #define FOOTPRINT_COUNT_GLSL
 #include "shared/flakes_in_footprint.glsl"
+#include "shared/footprint_area.glsl"
 
 // The parallelogram of a pixel: its centre, and its sides.
 struct AskedFootprint {
@@ -58,7 +59,7 @@ float counted_flakes(AskedFootprint footprint) {
 }
 
 float footprint_area(AskedFootprint footprint) {
-  return abs(footprint.side_x.x * footprint.side_y.y - footprint.side_x.y * footprint.side_y.x);
+  return footprint_area(footprint.side_x, footprint.side_y);
 }
 
 #endif

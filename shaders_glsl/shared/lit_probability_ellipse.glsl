@@ -76,9 +76,9 @@ float lit_probability_box(vec3 i, vec3 o, float sin2_half_gamma, float alpha) {
   }
   SlopeEllipse ellipse = slope_ellipse(map, sin2_half_gamma);
   vec2 reach = 0.5 * sqrt(PI) * vec2(ellipse.half_long, ellipse.half_short);
-  vec2 low = (ellipse.center - reach) / alpha;
-  vec2 high = (ellipse.center + reach) / alpha;
-  return 0.25 * erf_between(low.x, high.x) * erf_between(low.y, high.y);
+  vec2 center = ellipse.center / alpha;
+  vec2 half_side = reach / alpha;
+  return 0.25 * erf_about(center.x, half_side.x) * erf_about(center.y, half_side.y);
 }
 
 // Six strips along the ellipse, their places and widths by Gauss and Chebyshev (second kind), each with error functions.
@@ -98,7 +98,7 @@ float lit_probability_strips(vec3 i, vec3 o, float sin2_half_gamma, float alpha)
   float total = 0.0;
   for (int strip = 0; strip < 3; ++strip) {
     float reach = half_long * SINES[strip];
-    float inside = 0.5 * erf_between(center.x - reach, center.x + reach);
+    float inside = 0.5 * erf_about(center.x, reach);
     float above = center.y + half_short * COSINES[strip];
     float below = center.y - half_short * COSINES[strip];
     total += SINES[strip] * inside * (exp(-above * above) + exp(-below * below));

@@ -33,11 +33,9 @@ vec3 lobe_under_lights(GlintSurface surface, float alpha) {
     if ((surface.shadowed >> index & 1u) == 0u) {
       Arrival arrival = arrival_at(lights[index], surface.position);
       vec3 i = arrival.direction;
-      vec3 sum = i + o;
-      float length2 = dot(sum, sum);
+      vec3 h = half_vector(i, o);
       float i_n = dot(i, n);
-      if (i_n > 0.0 && length2 > 1e-12) {
-        vec3 h = sum * inversesqrt(length2);
+      if (i_n > 0.0 && h != vec3(0.0)) {
         float shadowing = beckmann_g1_over_cosine(i_n, alpha) * beckmann_g1_over_cosine(dot(o, n), alpha);
         float lobe = 0.25 * glint_density(surface, i, h) * shadowing;
         radiance += arrival.irradiance * i_n * lobe * schlick(surface.f0, half_vector_cosine(i, o));

@@ -1,7 +1,7 @@
 //! A device under validation, and frames rendered on it.
 
 use crate::Picture;
-use mica_gpu::{Device, DeviceOptions, Executor, Messages, Timing};
+use mica_gpu::{Device, DeviceOptions, Executor, Messages, Timing, Validation};
 use mica_graph::{Buffer, Graph};
 use mica_render::{Cache, LeftOut, OcclusionBackend, Question, Ray, RayAnswer, RayCounts, Renderer, View};
 use std::sync::{Arc, LazyLock};
@@ -47,8 +47,9 @@ impl Gpu {
     /// The best device there is.
     #[expect(clippy::new_without_default, reason = "nothing about opening a device is a default")]
     pub fn new() -> Self {
-        let device = Device::new(&DeviceOptions { validation: true, ..DeviceOptions::default() })
-            .expect("a device with validation (ci/setup --test installs one)");
+        let device =
+            Device::new(&DeviceOptions { validation: Validation::Synchronization, ..DeviceOptions::default() })
+                .expect("a device with validation (ci/setup --test installs one)");
         let executor = Executor::new(device.clone()).expect("an executor");
         let messages = device.messages();
         Self { executor: Some(executor), device: Some(device), messages }

@@ -106,6 +106,29 @@ fn each_pixel_shows_the_oracle_s_flakes() {
     }
 }
 
+/// A million squares from the origin a float tells eight places along a side of a square apart.
+#[test]
+fn any_number_of_squares_from_the_origin_the_flakes_are_the_same() {
+    let mut gpu = Gpu::new();
+    for method in ["flakes", "atanasov"] {
+        let pictures = [0.0, 1.0, 1_048_576.0].map(|squares: f32| {
+            let glint = Glint { count: 20_000.0, alpha: 0.3, gamma_deg: 4.0, ..Glint::default() };
+            let mut scene = plane(conductor(method, glint), 40.0);
+            for [u, v] in scene.meshes.iter_mut().flat_map(|mesh| &mut mesh.uv[0]) {
+                (*u, *v) = (*u + squares, *v - squares);
+            }
+            let sun = [Light::Directional { direction: -SUN.normalize(), irradiance: [1.0; 3] }];
+            let mut renderer = Renderer::new(scene, &sun, None, OcclusionBackend::None).expect("the scene is sound");
+            shown(&mut gpu, &mut renderer, &[])
+        });
+        let lit = pictures[0].pixels.iter().filter(|pixel| pixel[1] > 0.0).count();
+        assert!(lit > 1000, "{method}: {lit}");
+        let [here, beside, far] = &pictures;
+        assert_eq!(here.pixels, beside.pixels, "{method}, one square on");
+        assert_eq!(here.pixels, far.pixels, "{method}, a million squares on");
+    }
+}
+
 /// The same flakes one after the other, however many of them a pass takes; and no walk is cut off, as that would show
 /// what is expected instead.
 #[test]

@@ -201,6 +201,7 @@ fn an_edit_updates_what_depends_on_it() {
         ("gamma_deg", "5", accumulated.clone()),
         ("alpha", "0.3", accumulated),
         ("samples", "2", vec!["prefilter_probability", "prefilter"]),
+        ("p_hat", "closed", vec!["prefilter_probability", "prefilter"]),
         ("micro", "2", vec![]),
         ("macro", "100", vec![]),
         ("cosine", "true", vec![]),

@@ -3,6 +3,7 @@
 mod alpha_masks;
 mod atanasov;
 mod borrowed;
+mod canaries;
 mod chermain;
 mod claims;
 mod contact_shadows;
@@ -31,6 +32,8 @@ mod shopf;
 mod smooth;
 mod stability;
 mod stage;
+mod sweeps;
+mod unary;
 mod wang2018;
 mod wang2020_quadtree;
 mod wang2020_shading;

@@ -280,7 +280,8 @@ fn prefiltered(
     graph.upload(&mut accumulated, bytemuck::cast_slice::<f32, u8>(table).to_vec());
     let mut probability = graph.buffer("prefilter_probability", (VIEWS * 4) as u64);
     let bind = prefilter_probability::Bind { accumulated: &accumulated, probability: &mut probability };
-    graph.pass(bind, (), Extent::line(VIEWS as u32));
+    let params = prefilter_probability::Params { alpha: alpha as f32, sin2_half_gamma: 0.0, closed: 0 };
+    graph.pass(bind, params, Extent::line(VIEWS as u32));
     let mut made = Buffer::new("prefilter", (normals * VIEWS * 16) as u64, Lifetime::Frame);
     let params = prefilter::Params { alpha: alpha as f32, samples };
     let bind = prefilter::Bind {

@@ -1,10 +1,10 @@
 //! The device that everything runs on: created here, or borrowed from a host.
 
-use crate::error::Error;
+use crate::error::{Call, Error};
 use crate::features::{Chain, DeviceRequirements, Feature, REQUIREMENTS, enables_ray_query, offered};
 use crate::info::{self, DeviceInfo};
 use crate::instance::Instance;
-use crate::messages::{Message, Messages};
+use crate::messages::{Message, Messages, Validation};
 use crate::structures::Support;
 use ash::{ext, vk};
 use std::ffi::{CString, c_char};
@@ -17,10 +17,8 @@ pub struct DeviceOptions {
     /// A device by its index in [`crate::devices`], or by a part of its name or of its driver's name and version, without
     /// regard to case. `None` takes the best: discrete before integrated before virtual before CPU.
     pub select: Option<String>,
-    /// Turns the validation layer on, with synchronisation validation. Its messages are collected for
-    /// [`Device::take_messages`]. Hazards between two submissions are seen only if the process was started with
-    /// `VK_LAYER_ENABLES=VALIDATION_CHECK_ENABLE_SYNCHRONIZATION_VALIDATION_QUEUE_SUBMIT` (layer 1.3.239).
-    pub validation: bool,
+    /// What the validation layer checks. Its messages are collected for [`Device::take_messages`].
+    pub validation: Validation,
 }
 
 /// A Vulkan device, ours or a host's.
@@ -74,8 +72,11 @@ impl Device {
             .enabled_extension_names(&extensions)
             .push_next(&mut enabled);
         // SAFETY: the device offers every feature in the chain, as `choose` checked, and has the queue family.
-        let raw = unsafe { instance.raw.create_device(physical, &create, None) }
-            .map_err(|result| unusable(&format!("vkCreateDevice: {result}")))?;
+        let made = unsafe { instance.raw.create_device(physical, &create, None) };
+        let raw = made.making("vkCreateDevice", "the device", 0).map_err(|error| match error {
+            Error::Vulkan { result, .. } => unusable(&format!("vkCreateDevice: {result}")),
+            other => other,
+        })?;
         // SAFETY: the queue was created with the device.
         let queue = unsafe { raw.get_device_queue(queue_family, 0) };
         let structures = enables_ray_query(&features).then(|| Support::new(&instance.raw, &raw, physical));
@@ -132,6 +133,13 @@ impl Device {
             let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
             // SAFETY: the handle is a live object of this device. A failure costs a name and nothing else.
             let _ = unsafe { debug_utils.set_debug_utils_object_name(&info) };
+        }
+    }
+
+    /// Notes of an error whether it says that the device is gone.
+    pub(crate) fn note_loss(&self, error: &Error) {
+        if matches!(error, Error::DeviceLost { .. }) {
+            self.lost.store(true, Ordering::Relaxed);
         }
     }
 

@@ -63,6 +63,9 @@ pub enum Error {
         /// The pass that did not finish, where known.
         pass: Option<String>,
     },
+    /// The window that was presented to is gone.
+    #[error("the window's surface was lost: make another surface and another presenter")]
+    SurfaceLost,
     /// The device did not answer in time.
     #[error("the device did not finish within {seconds} s{}; use a smaller size or fewer glints", in_pass(.pass))]
     Timeout {
@@ -186,6 +189,18 @@ impl Error {
     }
 }
 
+/// Whether a call failed for want of memory of any kind.
+pub(crate) fn is_out_of_memory(result: vk::Result) -> bool {
+    matches!(
+        result,
+        vk::Result::ERROR_OUT_OF_HOST_MEMORY
+            | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY
+            | vk::Result::ERROR_OUT_OF_POOL_MEMORY
+            | vk::Result::ERROR_FRAGMENTED_POOL
+            | vk::Result::ERROR_FRAGMENTATION
+    )
+}
+
 /// Turns a failed call into an error that says which.
 pub(crate) trait Call<T> {
     /// Names the function that was called.
@@ -201,13 +216,11 @@ impl<T> Call<T> for Result<T, vk::Result> {
 
     fn making(self, call: &'static str, what: &str, bytes: u64) -> Result<T, Error> {
         self.map_err(|result| match result {
-            vk::Result::ERROR_OUT_OF_HOST_MEMORY
-            | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY
-            | vk::Result::ERROR_OUT_OF_POOL_MEMORY
-            | vk::Result::ERROR_FRAGMENTED_POOL => {
+            result if is_out_of_memory(result) => {
                 Error::OutOfMemory { what: what.to_owned(), bytes, detail: result.to_string() }
             }
             vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost { pass: None },
+            vk::Result::ERROR_SURFACE_LOST_KHR => Error::SurfaceLost,
             _ => Error::Vulkan { call, result },
         })
     }

@@ -105,6 +105,10 @@ impl Executor {
     /// If the frame cannot be planned or recorded, memory runs out, or the device is lost or does not answer in time.
     /// [`Error::Borrowed`] on a borrowed device.
     pub fn run(&mut self, graph: Graph, timing: Timing) -> Result<Run, Error> {
+        self.run_alive(graph, timing).inspect_err(|error| self.device.note_loss(error))
+    }
+
+    fn run_alive(&mut self, graph: Graph, timing: Timing) -> Result<Run, Error> {
         let Some(to) = self.submission.as_ref().map(Submission::command_buffer) else { return Err(Error::Borrowed) };
         self.device.check_alive()?;
         let plan = self.plan(graph)?;
@@ -153,7 +157,7 @@ impl Executor {
         self.device.check_alive()?;
         let plan = self.plan(graph)?;
         // SAFETY: as the caller promises.
-        unsafe { self.record_plan(plan, command_buffer, timing) }
+        unsafe { self.record_plan(plan, command_buffer, timing) }.inspect_err(|error| self.device.note_loss(error))
     }
 
     /// Takes the results of a recorded frame, and its memory back.
@@ -170,8 +174,8 @@ impl Executor {
         slot.frame = None;
         let memory = slot.staging.as_ref().and_then(|staging| staging.allocation.mapped_slice()).unwrap_or_default();
         let downloads = downloads.into_iter().map(|(download, place)| (download, memory[place].to_vec())).collect();
-        self.note_compacted(index, &plan)?;
-        let (pass_ns, frame_ns) = self.times(index, timing, plan.passes.len())?;
+        let measured = self.note_compacted(index, &plan).and_then(|()| self.times(index, timing, plan.passes.len()));
+        let (pass_ns, frame_ns) = measured.inspect_err(|error| self.device.note_loss(error))?;
         let passes =
             plan.passes.iter().zip(pass_ns).map(|(pass, ns)| PassTime { name: pass.name.clone(), ns }).collect();
         self.collect();

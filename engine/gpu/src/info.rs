@@ -1,8 +1,9 @@
 //! What devices there are, what they can do, and which of them would serve.
 
-use crate::error::Error;
+use crate::error::{Call, Error};
 use crate::features::{self, REQUIREMENTS, Version};
 use crate::instance::Instance;
+use crate::messages::Validation;
 use ash::vk;
 use std::ffi::CStr;
 
@@ -55,6 +56,14 @@ pub struct Limits {
     pub max_buffer_bytes: u64,
     /// Most bytes of push constants.
     pub max_push_constants_bytes: u32,
+    /// Most storage buffers that one stage of a shader sees.
+    pub max_stage_storage_buffers: u32,
+    /// Most storage images that one stage of a shader sees.
+    pub max_stage_storage_images: u32,
+    /// Most sampled images that one stage of a shader sees.
+    pub max_stage_sampled_images: u32,
+    /// Most invocations of a group.
+    pub max_group_invocations: u32,
     /// Most texels along a side of a flat image.
     pub max_image_side_2d: u32,
     /// Most texels along a side of a volume.
@@ -118,7 +127,7 @@ pub(crate) struct CacheIdentity {
 /// # Errors
 /// [`Error::NoLoader`] or [`Error::NoDriver`] where there is nothing to ask.
 pub fn devices() -> Result<Vec<DeviceInfo>, Error> {
-    let instance = Instance::new(false)?;
+    let instance = Instance::new(Validation::Off)?;
     Ok(enumerate(&instance.raw)?.into_iter().map(|(_, info)| info).collect())
 }
 
@@ -126,11 +135,19 @@ pub fn devices() -> Result<Vec<DeviceInfo>, Error> {
 pub(crate) fn enumerate(instance: &ash::Instance) -> Result<Vec<(vk::PhysicalDevice, DeviceInfo)>, Error> {
     // SAFETY: the instance is alive.
     let found =
-        unsafe { instance.enumerate_physical_devices() }.map_err(|result| Error::NoDriver(result.to_string()))?;
+        unsafe { instance.enumerate_physical_devices() }.call("vkEnumeratePhysicalDevices").map_err(no_driver)?;
     if found.is_empty() {
         return Err(Error::NoDriver("the drivers found offer no device".to_owned()));
     }
     Ok(found.into_iter().enumerate().map(|(index, device)| (device, describe(instance, device, index))).collect())
+}
+
+/// A call about drivers that failed, other than for want of memory, speaks of a driver that does not work.
+pub(crate) fn no_driver(error: Error) -> Error {
+    match error {
+        Error::Vulkan { result, .. } => Error::NoDriver(result.to_string()),
+        other => other,
+    }
 }
 
 /// A family with graphics and compute.
@@ -174,6 +191,10 @@ pub(crate) fn describe(instance: &ash::Instance, device: vk::PhysicalDevice, ind
             max_uniform_buffer_range_bytes: core.limits.max_uniform_buffer_range.into(),
             max_buffer_bytes: maintenance4.max_buffer_size,
             max_push_constants_bytes: core.limits.max_push_constants_size,
+            max_stage_storage_buffers: core.limits.max_per_stage_descriptor_storage_buffers,
+            max_stage_storage_images: core.limits.max_per_stage_descriptor_storage_images,
+            max_stage_sampled_images: core.limits.max_per_stage_descriptor_sampled_images,
+            max_group_invocations: core.limits.max_compute_work_group_invocations,
             max_image_side_2d: core.limits.max_image_dimension2_d,
             max_image_side_3d: core.limits.max_image_dimension3_d,
             max_image_layers: core.limits.max_image_array_layers,

@@ -2,7 +2,8 @@
 
 use crate::error::{Call, Error};
 use crate::features::{REQUIREMENTS, Version};
-use crate::messages::Messages;
+use crate::info::no_driver;
+use crate::messages::{Messages, Validation};
 use ash::{ext, vk};
 
 const VALIDATION_LAYER: &std::ffi::CStr = c"VK_LAYER_KHRONOS_validation";
@@ -25,16 +26,18 @@ struct Messenger {
 
 impl Instance {
     /// Opens the loader and creates an instance.
-    pub(crate) fn new(validation: bool) -> Result<Self, Error> {
+    pub(crate) fn new(validation: Validation) -> Result<Self, Error> {
+        let validates = validation != Validation::Off;
         // SAFETY: loading a library runs its initialisers; the Vulkan loader's are harmless.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| Error::NoLoader(error.to_string()))?;
         check_loader(&entry)?;
         // SAFETY: no layer name is passed.
         let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }
-            .map_err(|result| Error::NoDriver(result.to_string()))?;
-        let debug_utils = validation
+            .call("vkEnumerateInstanceExtensionProperties")
+            .map_err(no_driver)?;
+        let debug_utils = validates
             || extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
-        if validation {
+        if validates {
             check_layer(&entry)?;
         }
         let mut layer_names = Vec::new();
@@ -42,7 +45,7 @@ impl Instance {
         if debug_utils {
             extension_names.push(ext::debug_utils::NAME.as_ptr());
         }
-        if validation {
+        if validates {
             layer_names.push(VALIDATION_LAYER.as_ptr());
             extension_names.push(ext::validation_features::NAME.as_ptr());
         }
@@ -52,28 +55,26 @@ impl Instance {
             .engine_name(c"mica")
             .api_version(REQUIREMENTS.api_version.packed());
         let mut messenger_info = log.messenger_info();
-        let synchronization = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
-        let mut validation_features =
-            vk::ValidationFeaturesEXT::default().enabled_validation_features(&synchronization);
+        let checks = validation.beside_core();
+        let mut validation_features = vk::ValidationFeaturesEXT::default().enabled_validation_features(checks);
         let mut info = vk::InstanceCreateInfo::default()
             .application_info(&application)
             .enabled_layer_names(&layer_names)
             .enabled_extension_names(&extension_names);
-        if validation {
+        if validates {
             info = info.push_next(&mut messenger_info).push_next(&mut validation_features);
         }
         // SAFETY: the chain and the names live until the call returns; `self` keeps the log in it until the instance is destroyed.
-        let raw = unsafe { entry.create_instance(&info, None) }.map_err(|result| match result {
-            vk::Result::ERROR_LAYER_NOT_PRESENT | vk::Result::ERROR_EXTENSION_NOT_PRESENT if validation => {
-                Error::NoValidation(result.to_string())
-            }
-            vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
-                Error::OutOfMemory { what: "the Vulkan instance".to_owned(), bytes: 0, detail: result.to_string() }
-            }
-            _ => Error::NoDriver(result.to_string()),
+        let made = unsafe { entry.create_instance(&info, None) };
+        let raw = made.making("vkCreateInstance", "the Vulkan instance", 0).map_err(|error| match error {
+            Error::Vulkan {
+                result: result @ (vk::Result::ERROR_LAYER_NOT_PRESENT | vk::Result::ERROR_EXTENSION_NOT_PRESENT),
+                ..
+            } if validates => Error::NoValidation(result.to_string()),
+            other => no_driver(other),
         })?;
         let mut instance = Self { raw, debug_utils, messenger: None, _entry: entry };
-        if validation {
+        if validates {
             let functions = ext::debug_utils::Instance::new(&instance._entry, &instance.raw);
             // SAFETY: the instance has the extension; `self` keeps the log until the messenger is destroyed.
             let raw = unsafe { functions.create_debug_utils_messenger(&log.messenger_info(), None) }

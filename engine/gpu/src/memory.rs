@@ -399,8 +399,11 @@ pub(crate) fn check_resource(
                     vk::ImageCreateFlags::empty(),
                 )
             };
-            let Ok(most) = properties else {
-                return bad(format!("this device has no {:?} images for {usage:?}", desc.format));
+            let most = match properties {
+                Err(vk::Result::ERROR_FORMAT_NOT_SUPPORTED) => {
+                    return bad(format!("this device has no {:?} images for {usage:?}", desc.format));
+                }
+                asked => asked.call("vkGetPhysicalDeviceImageFormatProperties")?,
             };
             let (size, max) = (desc.extent, most.max_extent);
             if size.width > max.width || size.height > max.height || size.depth > max.depth {

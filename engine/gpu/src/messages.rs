@@ -1,8 +1,39 @@
-//! What the validation layer says, collected so that a test can fail on it.
+//! What the validation layer checks, and what it says, collected so that a test can fail on it.
 
 use ash::vk;
 use std::ffi::{CStr, c_void};
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// What Vulkan's validation layer checks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Validation {
+    /// Nothing: the layer is not asked for.
+    #[default]
+    Off,
+    /// Each call against the rules of the specification.
+    Core,
+    /// The same, and whether accesses that conflict are ordered. Hazards between two submissions are seen only if the
+    /// process was started with `VK_LAYER_ENABLES=VALIDATION_CHECK_ENABLE_SYNCHRONIZATION_VALIDATION_QUEUE_SUBMIT`
+    /// (layer 1.3.239).
+    Synchronization,
+    /// The rules of the specification, and where shaders read and write: their code is changed for it, which takes time.
+    /// The layer keeps one set of descriptors for itself.
+    GpuAssisted,
+}
+
+impl Validation {
+    /// What is switched on beside the core checks, which are on by default.
+    pub(crate) fn beside_core(self) -> &'static [vk::ValidationFeatureEnableEXT] {
+        match self {
+            Self::Off | Self::Core => &[],
+            Self::Synchronization => &[vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION],
+            Self::GpuAssisted => &[
+                vk::ValidationFeatureEnableEXT::GPU_ASSISTED,
+                vk::ValidationFeatureEnableEXT::GPU_ASSISTED_RESERVE_BINDING_SLOT,
+            ],
+        }
+    }
+}
 
 /// One message of the validation layer.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -3,7 +3,8 @@
 use crate::device::{Device, c_string};
 use crate::error::{Call, Error};
 use crate::features::Feature;
-use crate::pipeline_cache::PipelineCache;
+use crate::pipeline_cache::{NOT_KEPT, PipelineCache};
+use crate::shader_limits;
 use crate::vulkan_types as to_vk;
 use ash::vk;
 use mica_graph::{BindingKind, Format, Sampler, Shader, Stage};
@@ -61,9 +62,7 @@ impl Pipelines {
         if let Some(pipeline) = self.made.get(&key) {
             return Ok(*pipeline);
         }
-        let most = self.device.info.limits.max_push_constants_bytes;
-        if shader.params_bytes > most {
-            let why = format!("{} bytes of push constants are more than this device's {most}", shader.params_bytes);
+        if let Some(why) = shader_limits::exceeded(shader, &self.device.info.limits) {
             return Err(Error::BadPass { pass: pass.to_owned(), why });
         }
         if let Some(feature) = capabilities(shader).find(|feature| !self.device.has(*feature)) {
@@ -77,7 +76,10 @@ impl Pipelines {
         } else {
             format!("{} {}", shader.name, shader.variant)
         };
-        let made = self.make(shader, attachments).map_err(|result| match result {
+        // What drivers do with damaged code is theirs to choose: they never see it.
+        let is_whole = shader.stages.iter().all(|stage| shader_limits::is_whole(stage.spirv));
+        let made = if is_whole { self.make(shader, attachments) } else { Err(vk::Result::ERROR_INVALID_SHADER_NV) };
+        let made = made.map_err(|result| match result {
             vk::Result::ERROR_OUT_OF_HOST_MEMORY | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => Error::OutOfMemory {
                 what: format!("the pipeline of pass {pass}"),
                 bytes: 0,
@@ -215,7 +217,7 @@ impl Drop for Pipelines {
     /// The executor has waited for the device.
     fn drop(&mut self) {
         if let Err(error) = self.cache.flush(&self.device) {
-            log::warn!("the pipeline cache was not written: {error}");
+            log::warn!(target: NOT_KEPT, "the pipeline cache was not written: {error}");
         }
         if !self.device.may_destroy() {
             return;

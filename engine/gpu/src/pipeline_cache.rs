@@ -7,14 +7,15 @@ use crate::device::Device;
 use crate::error::{Call, Error};
 use crate::info::CacheIdentity;
 use ash::vk;
-use std::fs::File;
-use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
 
 const MAGIC: [u8; 8] = *b"MICAPIPE";
 const FORMAT: u32 = 1;
 const HEADER_BYTES: usize = 8 + 4 + 3 * 16 + 4 + 32;
+
+/// The target of log lines about caches that the file system refuses. They cost time and nothing else, so a host may show
+/// the first alone.
+pub const NOT_KEPT: &str = "mica::not_kept";
 
 /// A pipeline cache, in memory and, where a path is given, on disk.
 pub(crate) struct PipelineCache {
@@ -37,13 +38,12 @@ impl PipelineCache {
         Ok(Self { raw, path, is_changed: false })
     }
 
-    /// Writes the file, if there is one and anything changed: under a temporary name, then renamed, so that a reader
-    /// sees the old file or the new one.
+    /// Writes the file, if there is one and anything changed: a reader sees the old file or the new one.
     pub(crate) fn flush(&mut self, device: &Device) -> std::io::Result<()> {
         let Some(path) = self.path.as_deref().filter(|_| self.is_changed) else { return Ok(()) };
         // SAFETY: the cache is alive, and this is the only thread that uses it.
         let data = unsafe { device.raw.get_pipeline_cache_data(self.raw) }.map_err(std::io::Error::other)?;
-        write_whole(path, &[header(&device.info.cache_identity, &data), data].concat())?;
+        store(path, &device.info.cache_identity, &data)?;
         self.is_changed = false;
         Ok(())
     }
@@ -67,7 +67,7 @@ fn load(path: &Path, identity: &CacheIdentity) -> Vec<u8> {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Vec::new(),
         Err(error) => {
-            log::warn!("pipeline cache {}: {error}; it is rebuilt", path.display());
+            log::warn!(target: NOT_KEPT, "pipeline cache {}: {error}; the run goes on without it", path.display());
             return Vec::new();
         }
     };
@@ -84,21 +84,9 @@ fn data_of<'a>(file: &'a [u8], identity: &CacheIdentity) -> Option<&'a [u8]> {
     (found == header(identity, data)).then_some(data)
 }
 
-fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    static NEXT: AtomicU32 = AtomicU32::new(0);
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder)?;
-    }
-    let unique = format!("{}-{}.tmp", std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed));
-    let temporary = path.with_extension(unique);
-    let written = File::create_new(&temporary)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
-        .and_then(|()| std::fs::rename(&temporary, path));
-    if written.is_err() {
-        // What could not be written is of no use; whether it can be removed changes nothing.
-        let _ = std::fs::remove_file(&temporary);
-    }
-    written
+fn store(path: &Path, identity: &CacheIdentity, data: &[u8]) -> std::io::Result<()> {
+    std::fs::create_dir_all(mica_files::folder_of(path))?;
+    mica_files::replace(path, &[&header(identity, data), data])
 }
 
 #[cfg(test)]
@@ -118,7 +106,7 @@ mod tests {
         let path = folder.path().join("below").join("pipelines");
         assert_eq!(load(&path, &IDENTITY), b"", "there is no file yet");
         for data in [&b"pipelines"[..], b"other pipelines"] {
-            write_whole(&path, &file_of(data)).expect("the file is written");
+            store(&path, &IDENTITY, data).expect("the file is written");
             assert_eq!(load(&path, &IDENTITY), data);
         }
         let left = std::fs::read_dir(path.parent().expect("a folder")).expect("the folder").count();

@@ -1,7 +1,7 @@
 //! Submission on a device of our own: one command buffer, one fence, and never an endless wait.
 
 use crate::device::Device;
-use crate::error::{Call, Error};
+use crate::error::{Call, Error, is_out_of_memory};
 use crate::timing::process_cpu_ns;
 use ash::vk;
 use std::sync::atomic::Ordering;
@@ -41,9 +41,11 @@ impl Submission {
     /// Empties the command buffer and begins it anew.
     pub(crate) fn begin(&mut self) -> Result<(), Error> {
         let device = &self.device.raw;
-        // SAFETY: the last submission of the command buffer was waited for.
-        unsafe { device.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
-            .call("vkResetCommandPool")?;
+        // SAFETY: the last submission of the command buffer was waited for, so nothing uses it or the fence.
+        unsafe {
+            device.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()).call("vkResetCommandPool")?;
+            device.reset_fences(&[self.fence]).call("vkResetFences")?;
+        }
         let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the command buffer is in its initial state.
         unsafe { device.begin_command_buffer(self.command_buffer, &info) }.call("vkBeginCommandBuffer")
@@ -51,21 +53,22 @@ impl Submission {
 
     /// Submits what was recorded and waits for it. Returns the processor time that passed, in nanoseconds.
     ///
-    /// After a wait that timed out, the device counts as lost and whatever it may still use is left to it.
+    /// After a wait that timed out or could not be made, the device counts as lost and whatever it may still use is left
+    /// to it.
     pub(crate) fn submit_and_wait(&mut self, timeout: Duration) -> Result<Option<u64>, Error> {
         let submitted = self.submit_and_wait_alive(timeout);
         match submitted {
-            Err(Error::DeviceLost { .. }) => {
-                self.device.lost.store(true, Ordering::Relaxed);
-                self.wait_for_the_lost();
-            }
-            Err(Error::Timeout { .. }) => {
-                self.device.lost.store(true, Ordering::Relaxed);
-                self.device.hung.store(true, Ordering::Relaxed);
-            }
+            Err(Error::DeviceLost { .. }) => self.wait_for_the_lost(),
+            Err(Error::Timeout { .. }) => self.give_up(),
             _ => {}
         }
         submitted
+    }
+
+    /// The device may still be at work, and nobody knows when it ends.
+    fn give_up(&self) {
+        self.device.lost.store(true, Ordering::Relaxed);
+        self.device.hung.store(true, Ordering::Relaxed);
     }
 
     /// A device that is lost still ends what it began, or never looks at it again: this wait has an end, and after it
@@ -92,13 +95,18 @@ impl Submission {
         }
         let timeout_ns = u64::try_from(timeout.as_nanos()).unwrap_or(u64::MAX);
         // SAFETY: the fence was submitted.
-        match unsafe { device.wait_for_fences(&[self.fence], true, timeout_ns) } {
+        let wait = || unsafe { device.wait_for_fences(&[self.fence], true, timeout_ns) };
+        // A wait that fails for want of memory says nothing about the frame: it is made once more.
+        let waited = wait().or_else(|result| if is_out_of_memory(result) { wait() } else { Err(result) });
+        match waited {
             Err(vk::Result::TIMEOUT) => return Err(Error::Timeout { seconds: timeout.as_secs_f64(), pass: None }),
-            waited => waited.call("vkWaitForFences")?,
+            waited => waited.call("vkWaitForFences").inspect_err(|error| {
+                if !matches!(error, Error::DeviceLost { .. }) {
+                    self.give_up();
+                }
+            })?,
         }
         let after = process_cpu_ns();
-        // SAFETY: the fence is signalled, so nothing uses it.
-        unsafe { device.reset_fences(&[self.fence]) }.call("vkResetFences")?;
         Ok(before.zip(after).map(|(before, after)| after.saturating_sub(before)))
     }
 }
@@ -118,7 +126,7 @@ impl Drop for Submission {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Device, DeviceOptions, Error, Executor, Messages, Timing};
+    use crate::{Device, DeviceOptions, Error, Executor, Messages, Timing, Validation};
     use ash::vk;
     use mica_graph::{Extent, Format, Graph, Image, ImageDesc, Lifetime};
     use std::cell::Cell;
@@ -156,7 +164,8 @@ mod tests {
     /// A device some of whose functions are others.
     fn changed_device(change: impl FnOnce(&mut Tables)) -> (Arc<Device>, Messages) {
         let mut device =
-            Device::new(&DeviceOptions { validation: true, ..DeviceOptions::default() }).expect("a device");
+            Device::new(&DeviceOptions { validation: Validation::Synchronization, ..DeviceOptions::default() })
+                .expect("a device");
         let messages = device.messages();
         let raw = &mut Arc::get_mut(&mut device).expect("nobody else has it").raw;
         let mut tables = (raw.fp_v1_0().clone(), raw.fp_v1_3().clone());
@@ -201,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_could_not_be_submitted_leave_no_trace() {
+    fn f24_frames_that_could_not_be_submitted_leave_no_trace() {
         let image = ImageDesc::new(Format::R32Float, Extent::new(4, 4));
         let mut image = Image::new("image", image, Lifetime::Scene);
         let (device, messages) = changed_device(|tables| {
@@ -224,12 +233,12 @@ mod tests {
     }
 
     #[test]
-    fn a_device_lost_in_submission_is_said_and_cleaned_up() {
+    fn f25_a_device_lost_in_submission_is_said_and_cleaned_up() {
         check_loss(|tables| tables.1.queue_submit2 = lost_in_submission);
     }
 
     #[test]
-    fn a_device_lost_in_a_wait_is_said_and_cleaned_up() {
+    fn f25_a_device_lost_in_a_wait_is_said_and_cleaned_up() {
         check_loss(|tables| tables.0.wait_for_fences = lost_in_wait);
     }
 }

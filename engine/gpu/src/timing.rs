@@ -60,7 +60,7 @@ impl Timestamps {
 }
 
 /// Nanoseconds between two timestamps of which only some bits count. The counter may wrap once in between.
-pub(crate) fn elapsed_ns(from: u64, to: u64, valid_bits: u32, period_ns: f32) -> u64 {
+pub fn elapsed_ns(from: u64, to: u64, valid_bits: u32, period_ns: f32) -> u64 {
     let mask = if valid_bits >= 64 { u64::MAX } else { (1 << valid_bits) - 1 };
     let ticks = to.wrapping_sub(from) & mask;
     // Exact wherever a tick is a nanosecond, as on most devices; f64 would round there after 104 days.

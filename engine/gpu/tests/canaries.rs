@@ -6,7 +6,7 @@
 use crate::common::host::Host;
 use crate::common::{bind, compute};
 use ash::vk;
-use mica_gpu::{Device, DeviceOptions, Executor, HostBuffer, Message, Timing};
+use mica_gpu::{Device, DeviceOptions, Executor, HostBuffer, Message, Timing, Validation};
 use mica_graph::{
     Access, BindingKind, Buffer, Extent, Format, Graph, Lifetime, Resource, Shader, Slot, Step, Use, Work,
 };
@@ -14,10 +14,9 @@ use std::sync::Arc;
 
 const BUFFER_BYTES: u64 = 1024;
 
-/// Runs a frame that is wrong and returns what validation said.
-fn messages_of(declare: impl FnOnce(&mut Graph)) -> Vec<Message> {
-    let options = DeviceOptions { validation: true, ..DeviceOptions::default() };
-    let device = Device::new(&options).expect("a device with validation");
+/// Runs a frame under one kind of validation and returns what that said.
+fn said_by(validation: Validation, declare: impl FnOnce(&mut Graph)) -> Vec<Message> {
+    let device = Device::new(&DeviceOptions { validation, ..DeviceOptions::default() }).expect("a device");
     let mut executor = Executor::new(device.clone()).expect("an executor");
     let mut graph = Graph::new();
     declare(&mut graph);
@@ -50,38 +49,78 @@ fn ids(messages: &[Message]) -> Vec<&str> {
     messages.iter().map(|message| message.id.as_str()).collect()
 }
 
-#[test]
-fn a_shader_that_does_not_fit_its_pipeline_layout_is_reported() {
+const KINDS: [Validation; 3] = [Validation::Core, Validation::Synchronization, Validation::GpuAssisted];
+
+/// A shader with push constants that its layout has not: against the rules of a call.
+fn misfit(graph: &mut Graph) {
     let glsl = "
         layout(local_size_x = 64) in;
         layout(push_constant) uniform Params { uint value; };
         layout(binding = 0) buffer B0 { uint b0[]; };
         void main() { b0[gl_GlobalInvocationID.x] = value; }";
-    let said = messages_of(|graph| {
-        let bindings = [(0, BindingKind::StorageBuffer, Access::StorageWrite)];
-        let without_params = compute("without_params", glsl, [64, 1, 1], 0, &bindings);
-        let buffer = graph.buffer("buffer", 256);
-        let uses = vec![bind(0, buffer.resource(), Access::StorageWrite)];
-        graph.push("without_params", dispatch(without_params), uses);
-        graph.download(&buffer);
-    });
-    assert!(ids(&said).iter().any(|id| id.starts_with("VUID-")), "{said:?}");
+    let bindings = [(0, BindingKind::StorageBuffer, Access::StorageWrite)];
+    let without_params = compute("without_params", glsl, [64, 1, 1], 0, &bindings);
+    let buffer = graph.buffer("buffer", 256);
+    let uses = vec![bind(0, buffer.resource(), Access::StorageWrite)];
+    graph.push("without_params", dispatch(without_params), uses);
+    graph.download(&buffer);
 }
 
-#[test]
-fn a_missing_barrier_between_a_dispatch_and_a_copy_is_reported() {
+/// A copy of an image that nothing orders after the dispatch that writes it: a hazard.
+fn hazard(graph: &mut Graph) {
     let glsl = "
         layout(local_size_x = 8, local_size_y = 8) in;
         layout(binding = 0, r32ui) uniform writeonly uimage2D b0;
         void main() { imageStore(b0, ivec2(gl_GlobalInvocationID.xy), uvec4(1)); }";
-    let said = messages_of(|graph| {
-        let write = compute("write", glsl, [8, 8, 1], 0, &[(0, BindingKind::StorageImage, Access::StorageWrite)]);
-        let mut image = graph.image("image", Format::R32Uint, Extent::new(8, 8));
-        graph.clear(&mut image, 0.0);
-        dispatch_in_secret(graph, write, image.resource());
-        graph.download_image(&image);
-    });
-    assert!(ids(&said).contains(&"SYNC-HAZARD-READ-AFTER-WRITE"), "{said:?}");
+    let write = compute("write", glsl, [8, 8, 1], 0, &[(0, BindingKind::StorageImage, Access::StorageWrite)]);
+    let mut image = graph.image("image", Format::R32Uint, Extent::new(8, 8));
+    graph.clear(&mut image, 0.0);
+    dispatch_in_secret(graph, write, image.resource());
+    graph.download_image(&image);
+}
+
+/// A dispatch that writes to a buffer of 64 words, each word so far from its place.
+fn writes(graph: &mut Graph, beyond: u32) {
+    let glsl = format!(
+        "layout(local_size_x = 64) in;
+        layout(binding = 0) buffer B0 {{ uint b0[]; }};
+        void main() {{ b0[gl_GlobalInvocationID.x + {beyond}u] = 1; }}"
+    );
+    let bindings = [(0, BindingKind::StorageBuffer, Access::StorageWrite)];
+    let write = compute("write", &glsl, [64, 1, 1], 0, &bindings);
+    let buffer = graph.buffer("buffer", 256);
+    graph.push("write", dispatch(write), vec![bind(0, buffer.resource(), Access::StorageWrite)]);
+    graph.download(&buffer);
+}
+
+#[test]
+fn f45_a_frame_without_a_mistake_is_passed_by_every_kind_of_validation() {
+    for kind in KINDS {
+        assert_eq!(said_by(kind, |graph| writes(graph, 0)), [], "{kind:?}");
+    }
+}
+
+#[test]
+fn f45_a_shader_that_does_not_fit_its_pipeline_layout_is_reported() {
+    let said = said_by(Validation::Core, misfit);
+    assert!(ids(&said).iter().any(|id| id.starts_with("VUID-")), "{said:?}");
+}
+
+#[test]
+fn f45_a_missing_barrier_between_a_dispatch_and_a_copy_is_reported_by_synchronisation_validation_alone() {
+    for kind in KINDS {
+        let said = said_by(kind, hazard);
+        let reported = ids(&said).contains(&"SYNC-HAZARD-READ-AFTER-WRITE");
+        assert_eq!(reported, kind == Validation::Synchronization, "{kind:?}: {said:?}");
+    }
+}
+
+#[test]
+fn f45_a_write_beyond_a_buffer_is_reported_by_gpu_assisted_validation_alone() {
+    for kind in KINDS {
+        let said = said_by(kind, |graph| writes(graph, 64));
+        assert_eq!(!said.is_empty(), kind == Validation::GpuAssisted, "{kind:?}: {said:?}");
+    }
 }
 
 #[test]

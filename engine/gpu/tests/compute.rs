@@ -117,7 +117,7 @@ fn groups_counted_by_one_pass_are_run_by_the_next() {
 }
 
 #[test]
-fn a_storage_buffer_beyond_the_device_s_range_is_refused_by_name_before_it_is_bound() {
+fn f23_a_storage_buffer_beyond_the_device_s_range_is_refused_by_name_before_it_is_bound() {
     let checked = Checked::new();
     let mut executor = checked.executor();
     let limit = checked.device().info().limits.max_storage_buffer_range_bytes;

@@ -1,7 +1,7 @@
 //! Finding a device, and what is said where there is none.
 
 use crate::common::Checked;
-use mica_gpu::{Device, DeviceKind, DeviceOptions, Error, devices};
+use mica_gpu::{Device, DeviceKind, DeviceOptions, Error, Validation, devices};
 use std::process::Command;
 
 #[test]
@@ -16,7 +16,7 @@ fn the_device_used_is_one_of_those_listed() {
 }
 
 #[test]
-fn a_device_is_selected_by_index_or_by_part_of_its_name() {
+fn f44_a_device_is_selected_by_index_or_by_part_of_its_name() {
     let listed = devices().expect("there is a driver");
     let usable = listed.iter().find(|info| info.unusable.is_none()).expect("one is usable");
     let select =
@@ -44,7 +44,8 @@ fn kinds_of_devices_are_ordered_best_first() {
 #[test]
 #[ignore = "is run in a child process by the tests below"]
 fn print_the_error_of_a_new_device() {
-    let validation = std::env::var_os("TEST_VALIDATION").is_some();
+    let asked = std::env::var_os("TEST_VALIDATION").is_some();
+    let validation = if asked { Validation::Core } else { Validation::Off };
     let error = Device::new(&DeviceOptions { validation, ..DeviceOptions::default() }).expect_err("none can be had");
     println!("exit code {}: {error}", error.exit_code());
 }
@@ -61,7 +62,7 @@ fn error_with(environment: &[(&str, &std::ffi::OsStr)]) -> String {
 }
 
 #[test]
-fn without_a_loader_the_package_to_install_is_named() {
+fn f19_without_a_loader_the_package_to_install_is_named() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     std::fs::write(folder.path().join("libvulkan.so.1"), b"not a library").expect("a file");
     let said = error_with(&[("LD_LIBRARY_PATH", folder.path().as_os_str())]);
@@ -69,14 +70,14 @@ fn without_a_loader_the_package_to_install_is_named() {
 }
 
 #[test]
-fn without_a_driver_the_package_to_install_is_named() {
+fn f20_without_a_driver_the_package_to_install_is_named() {
     let nowhere = std::ffi::OsStr::new("/nonexistent");
     let said = error_with(&[("VK_DRIVER_FILES", nowhere), ("VK_ICD_FILENAMES", nowhere)]);
     assert!(said.contains("exit code 3: no Vulkan driver") && said.contains("mesa-vulkan-drivers"), "{said}");
 }
 
 #[test]
-fn without_the_validation_layer_a_device_with_validation_is_refused() {
+fn f45_without_the_validation_layer_a_device_with_validation_is_refused() {
     let said = error_with(&[
         ("VK_LAYER_PATH", std::ffi::OsStr::new("/nonexistent")),
         ("TEST_VALIDATION", std::ffi::OsStr::new("1")),

@@ -162,7 +162,7 @@ fn run(host: &Host, executor: &mut Executor, frame: &mut Frame) -> Result<Vec<u3
 }
 
 #[test]
-fn any_one_call_may_fail_and_the_next_try_succeeds() {
+fn f24_any_one_call_may_fail_and_the_next_try_succeeds() {
     let host = Host::new();
     let faulty = faulty_device(&host);
     let device = host.lend_table(&faulty);

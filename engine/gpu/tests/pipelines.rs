@@ -16,7 +16,7 @@ fn run_once(checked: &Checked, cache: &Path, shader: &'static Shader) {
 }
 
 #[test]
-fn a_damaged_pipeline_cache_is_rebuilt() {
+fn f28_a_damaged_pipeline_cache_is_rebuilt() {
     let glsl = "
         layout(local_size_x = 64) in;
         layout(binding = 0) writeonly buffer B0 { uint b0[]; };

@@ -56,7 +56,7 @@ fn isolated_times_every_pass_and_overlapped_the_frame_alone() {
 }
 
 #[test]
-fn a_frame_that_does_not_end_in_time_names_its_pass_and_ends_the_device() {
+fn f26_a_frame_that_does_not_end_in_time_names_its_pass_and_ends_the_device() {
     // Without validation and on a device of its own: what hangs is left behind on purpose.
     let device = Device::new(&DeviceOptions::default()).expect("a device");
     let options = ExecutorOptions { timeout: Duration::from_millis(300), ..ExecutorOptions::default() };

@@ -276,6 +276,26 @@ impl Graph {
         &self.passes
     }
 
+    /// Runs one shader wherever another is declared, so that two forms of a pass can be compared in the same frame; returns how
+    /// often it was. Both have the same bindings, parameters and groups, or nothing is exchanged.
+    pub fn exchange(&mut self, declared: &'static Shader, other: &'static Shader) -> usize {
+        let interface = |of: &'static Shader| (of.bindings, of.params_bytes, of.group, of.outputs);
+        if interface(declared) != interface(other) {
+            return 0;
+        }
+        let mut exchanged = 0;
+        for pass in &mut self.passes {
+            if let Work::Compute { shader, .. } | Work::ComputeIndirect { shader, .. } | Work::Raster { shader, .. } =
+                &mut pass.work
+                && std::ptr::eq(*shader, declared)
+            {
+                *shader = other;
+                exchanged += 1;
+            }
+        }
+        exchanged
+    }
+
     /// Appends a pass as it is. Passes of shaders are better declared with [`Graph::pass`], whose uses cannot be wrong.
     pub fn push(&mut self, name: impl Into<String>, work: Work, uses: Vec<Use>) {
         self.passes.push(Pass { name: name.into(), why: self.why.clone(), work, uses });

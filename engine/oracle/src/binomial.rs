@@ -57,6 +57,19 @@ impl Binomial {
         (self.n as f64 * (-self.p).ln_1p()).exp()
     }
 
+    /// The least number that is exceeded with probability `v` or less.
+    pub fn exceeded_with(&self, v: f64) -> u64 {
+        // From the top, so that small tails keep their digits.
+        let mut beyond = 0.0;
+        for (at, mass) in self.masses.iter().enumerate().rev() {
+            beyond += mass;
+            if beyond > v {
+                return self.first + at as u64;
+            }
+        }
+        self.first
+    }
+
     /// Wasserstein-1 distance of values from the law: the area between the two distribution functions, each value having the
     /// same weight. They need not be whole.
     ///
@@ -121,6 +134,19 @@ mod tests {
             assert!((moment(2) / law.variance() - 1.0).abs() < 1e-9, "{n} {p}: {}", moment(2));
             if law.first == 0 {
                 assert!((law.masses[0] / law.probability_of_none() - 1.0).abs() < 1e-9, "{n} {p}");
+            }
+        }
+    }
+
+    #[test]
+    fn as_many_exceed_a_number_as_it_says() {
+        for (n, p) in [(6, 0.3), (1000, 0.01), (1 << 40, 1e-11)] {
+            let law = Binomial::new(n, p).expect("a law");
+            for v in [1.0, 0.999, 0.5, 0.1, 1e-6] {
+                let number = law.exceeded_with(v);
+                let beyond = |number: u64| -> f64 { law.masses[(number - law.first) as usize + 1..].iter().sum() };
+                assert!(beyond(number) <= v, "{n} {p}: {number} is exceeded with {}", beyond(number));
+                assert!(number == law.first || beyond(number - 1) > v, "{n} {p}: {number} is not the least for {v}");
             }
         }
     }

@@ -1,15 +1,12 @@
 //! Tables kept between runs: never needed for correctness, checked before use, written whole or not at all.
 
 use std::fs;
-use std::io::{self, Write};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime};
 
 const MAGIC: &[u8; 8] = b"MICA\x01\r\n\x1a";
 const HEADER_BYTES: usize = 8 + 8 + 8 + 32;
 const ENDIANNESS_AND_VERSION: u64 = 0x0102_0304_0506_0001;
-/// A file whose writer died is removed after this time.
-const STALE: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// Why an entry was not used.
 #[derive(Debug, thiserror::Error)]
@@ -28,6 +25,16 @@ pub enum CacheError {
         /// Which file.
         path: PathBuf,
     },
+}
+
+impl CacheError {
+    /// Says so in the log.
+    pub fn warn(&self) {
+        match self {
+            Self::Io { .. } => log::warn!(target: mica_gpu::NOT_KEPT, "{self}"),
+            Self::Damaged { .. } => log::warn!("{self}"),
+        }
+    }
 }
 
 /// A folder of entries by name. Any number of processes may share it.
@@ -59,71 +66,73 @@ impl Cache {
     /// The bytes stored under `key`; `None` if there are none.
     pub fn load(&self, key: &str) -> Result<Option<Vec<u8>>, CacheError> {
         let path = self.path(key);
-        let bytes = match fs::read(&path) {
-            Ok(bytes) => bytes,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            Err(source) => return Err(CacheError::Io { path, source }),
-        };
-        match payload(&bytes) {
-            Some(payload) => Ok(Some(payload.to_vec())),
-            None => Err(CacheError::Damaged { path }),
+        match open(&path).and_then(|(file, bytes)| read(file, bytes)) {
+            Ok(Some(payload)) => Ok(Some(payload)),
+            Ok(None) => Err(CacheError::Damaged { path }),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(source) => Err(CacheError::Io { path, source }),
         }
     }
 
-    /// Stores bytes under `key`: into a file of another name first, which then takes the entry's place.
+    /// Stores bytes under `key`: a reader sees the old entry or the new one.
     pub fn store(&self, key: &str, payload: &[u8]) -> Result<(), CacheError> {
         let path = self.path(key);
-        let failed = |source| CacheError::Io { path: path.clone(), source };
-        fs::create_dir_all(&self.folder).map_err(failed)?;
-        self.remove_stale();
-        let unique = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |time| time.as_nanos());
-        let temporary = self.folder.join(format!("{key}.{}.{unique}.tmp", std::process::id()));
-        let write = || -> io::Result<()> {
-            let mut file = fs::File::create_new(&temporary)?;
-            file.write_all(&header(payload))?;
-            file.write_all(payload)?;
-            file.sync_all()?;
-            fs::rename(&temporary, &path)?;
-            // The folder too: a crash must not bring the old entry back half renamed.
-            fs::File::open(&self.folder)?.sync_all()
-        };
-        write().map_err(|source| {
-            let _ = fs::remove_file(&temporary);
-            failed(source)
-        })
+        fs::create_dir_all(&self.folder)
+            .and_then(|()| mica_files::replace(&path, &[&header(payload), payload]))
+            .map_err(|source| CacheError::Io { path, source })
+    }
+
+    /// The file of an entry, as bytes.
+    pub fn entry(payload: &[u8]) -> Vec<u8> {
+        [&header(payload)[..], payload].concat()
+    }
+
+    /// What the bytes of an entry's file hold; none when they are not those that were written.
+    pub fn payload(entry: &[u8]) -> Option<Vec<u8>> {
+        read(entry, entry.len() as u64).ok().flatten()
     }
 
     fn path(&self, key: &str) -> PathBuf {
         self.folder.join(format!("{key}.bin"))
     }
+}
 
-    fn remove_stale(&self) {
-        let Ok(entries) = fs::read_dir(&self.folder) else { return };
-        for entry in entries.flatten() {
-            let stale = entry.path().extension().is_some_and(|extension| extension == "tmp")
-                && entry
-                    .metadata()
-                    .and_then(|metadata| metadata.modified())
-                    .is_ok_and(|modified| modified.elapsed().is_ok_and(|age| age > STALE));
-            if stale {
-                let _ = fs::remove_file(entry.path());
-            }
-        }
-    }
+/// All of a header but the checksum.
+fn start_of_header(payload_bytes: u64) -> [u8; 24] {
+    let mut start = [0; 24];
+    start[..8].copy_from_slice(MAGIC);
+    start[8..16].copy_from_slice(&ENDIANNESS_AND_VERSION.to_ne_bytes());
+    start[16..].copy_from_slice(&payload_bytes.to_ne_bytes());
+    start
 }
 
 fn header(payload: &[u8]) -> Vec<u8> {
-    let mut header = Vec::with_capacity(HEADER_BYTES);
-    header.extend(MAGIC);
-    header.extend(ENDIANNESS_AND_VERSION.to_ne_bytes());
-    header.extend((payload.len() as u64).to_ne_bytes());
-    header.extend(blake3::hash(payload).as_bytes());
-    header
+    [&start_of_header(payload.len() as u64)[..], blake3::hash(payload).as_bytes()].concat()
 }
 
-fn payload(bytes: &[u8]) -> Option<&[u8]> {
-    let payload = bytes.get(HEADER_BYTES..)?;
-    (bytes[..HEADER_BYTES] == header(payload)).then_some(payload)
+/// A regular file and its length.
+fn open(path: &Path) -> io::Result<(fs::File, u64)> {
+    // Before opening: opening a pipe would wait for its other end.
+    let metadata = fs::metadata(path)?;
+    if !metadata.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
+    }
+    Ok((fs::File::open(path)?, metadata.len()))
+}
+
+/// The payload of an entry's file of that length; none when it is damaged. A file that is none of ours is told by its
+/// header, so that its length, which may be anything, costs nothing.
+fn read(mut file: impl Read, file_bytes: u64) -> io::Result<Option<Vec<u8>>> {
+    let mut header = Vec::with_capacity(HEADER_BYTES);
+    file.by_ref().take(HEADER_BYTES as u64).read_to_end(&mut header)?;
+    let payload_bytes = file_bytes.saturating_sub(HEADER_BYTES as u64);
+    if header.len() < HEADER_BYTES || header[..24] != start_of_header(payload_bytes) {
+        return Ok(None);
+    }
+    let mut payload = Vec::new();
+    payload.try_reserve_exact(payload_bytes as usize)?;
+    file.take(payload_bytes).read_to_end(&mut payload)?;
+    Ok((header == self::header(&payload)).then_some(payload))
 }
 
 #[cfg(test)]
@@ -149,6 +158,7 @@ mod tests {
         cache.store("table", &[7; 100]).unwrap();
         let path = cache.path("table");
         let whole = fs::read(&path).unwrap();
+        assert_eq!((whole.clone(), Cache::payload(&whole)), (Cache::entry(&[7; 100]), Some(vec![7; 100])));
         for at in 0..whole.len() {
             let mut damaged = whole.clone();
             damaged[at] ^= 0x10;
@@ -157,6 +167,26 @@ mod tests {
             fs::write(&path, &whole[..at]).unwrap();
             assert!(matches!(cache.load("table"), Err(CacheError::Damaged { .. })), "cut at {at}");
         }
+    }
+
+    #[test]
+    fn files_that_are_none_of_ours_are_neither_read_whole_nor_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = Cache::new(folder.path());
+        cache.store("table", &[7; 100]).unwrap();
+        // A terabyte, of which the file system stores the header alone.
+        fs::File::options().write(true).open(cache.path("table")).and_then(|file| file.set_len(1 << 40)).unwrap();
+        assert!(matches!(cache.load("table"), Err(CacheError::Damaged { .. })));
+        // The same with that length in the header: no machine has so much.
+        let mut forged = start_of_header((1 << 62) - HEADER_BYTES as u64).to_vec();
+        forged.resize(HEADER_BYTES, 0);
+        fs::write(cache.path("forged"), forged).unwrap();
+        assert!(matches!(cache.load("forged"), Err(CacheError::Damaged { .. })));
+        fs::create_dir(cache.path("folder")).unwrap();
+        assert!(matches!(cache.load("folder"), Err(CacheError::Io { .. })));
+        let made = std::process::Command::new("mkfifo").arg(cache.path("pipe")).status();
+        assert!(made.is_ok_and(|status| status.success()), "mkfifo is part of every Debian");
+        assert!(matches!(cache.load("pipe"), Err(CacheError::Io { .. })));
     }
 
     #[test]

@@ -186,6 +186,9 @@ impl SceneBuffers {
             material.glint_color = [r, g, b, glint.values.number("uv_scale") as f32];
             material.glint_uv_set = glint.uv_set;
             material.flags |= c::MATERIAL_GLINTS;
+            if glint.method.repeats {
+                material.flags |= c::MATERIAL_GLINT_REPEATS;
+            }
         }
         if materials.is_empty() {
             materials.push(types::Material::default());

@@ -34,7 +34,7 @@ fn zeros_without_a_buffer_view_are_bounded_too() {
     document.refused(Code::AccessorTooLong, "accessors[0]");
 
     // Allowed alone, but not a hundred times.
-    document.json["accessors"][0]["count"] = json!(1 << 26);
+    document.json["accessors"][0]["count"] = json!(1 << 24);
     let primitive = document.primitive().clone();
     document.json["meshes"][0]["primitives"] = Value::Array(vec![primitive; 100]);
     let limits = LoadLimits { total_bytes: 1 << 20, ..LoadLimits::default() };

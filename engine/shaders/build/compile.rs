@@ -110,6 +110,9 @@ fn compile_into(
     if !job.picks.is_empty() {
         command.arg(glued("-I", &variant_folder(out, job)));
     }
+    if job.naive {
+        command.arg("-DNAIVE_FORMS");
+    }
     command.arg(in_folder(root, source)).current_dir(folder_above(root));
     let output = command.output().map_err(|error| one(format!("glslangValidator does not start: {error}")))?;
     let (mut errors, found) = messages(&output, &in_folder(root, source), job);

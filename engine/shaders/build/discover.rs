@@ -17,14 +17,19 @@ struct Choice {
     key: &'static str,
 }
 
-const CHOICES: [Choice; 6] = [
+const CHOICES: [Choice; 7] = [
     Choice { include: "method.glsl", folder: "methods", key: "method" },
     Choice { include: "occlusion.glsl", folder: "occlusion", key: "occlusion" },
     Choice { include: "probability.glsl", folder: "rungs/probability", key: "probability" },
     Choice { include: "count.glsl", folder: "rungs/count", key: "count" },
     Choice { include: "arithmetic.glsl", folder: "rungs/arithmetic", key: "arithmetic" },
     Choice { include: "bits.glsl", folder: "rungs/bits", key: "bits" },
+    Choice { include: "unary.glsl", folder: "rungs/unary", key: "unary" },
 ];
+
+/// Passes that are compiled once more with `NAIVE_FORMS` defined, under their name and `_naive`: what their stable forms cost
+/// is measured against that.
+const NAIVE_TOO: [&str; 2] = ["base", "glints"];
 
 /// What a per-variant include stands for in one variant.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,6 +53,8 @@ pub struct Job {
     pub stages: Vec<(Stage, String)>,
     /// What its per-variant includes stand for; empty without variants.
     pub picks: Vec<Pick>,
+    /// Whether `NAIVE_FORMS` is defined.
+    pub naive: bool,
 }
 
 impl Job {
@@ -126,11 +133,15 @@ pub fn discover(root: &Path) -> Result<Found, Vec<Problem>> {
         }
         match variants(&found.sources, &stages) {
             Ok(variants) => {
-                found.jobs.extend(variants.into_iter().map(|picks| Job {
-                    name: name.clone(),
-                    stages: stages.clone(),
-                    picks,
-                }));
+                let twin = NAIVE_TOO.contains(&name.as_str()).then(|| (format!("{name}_naive"), true));
+                for (name, naive) in [(name, false)].into_iter().chain(twin) {
+                    found.jobs.extend(variants.iter().map(|picks| Job {
+                        name: name.clone(),
+                        stages: stages.clone(),
+                        picks: picks.clone(),
+                        naive,
+                    }));
+                }
             }
             Err(VariantError::Problem(problem)) => problems.push(problem),
             Err(VariantError::Nothing(folder)) => {

@@ -13,7 +13,7 @@ use mica_graph::{
     Structure,
 };
 use shaders::types::{Camera, Particle, Range, Spin, Table};
-use shaders::{access, constants, counts, glints, layouts, mesh, tonemap};
+use shaders::{access, constants, counts, glints, glints_naive, layouts, mesh, tonemap};
 use std::mem::{offset_of, size_of};
 
 fn image(name: &str) -> Image {
@@ -196,6 +196,13 @@ fn a_pass_with_a_method_and_occlusion_is_made_for_each_pair() {
 }
 
 #[test]
+fn a_twin_of_naive_forms_differs_in_its_code_alone() {
+    let (stable, naive) = (&glints::smooth_bvh::SHADER, &glints_naive::smooth_bvh::SHADER);
+    assert_eq!((stable.bindings, stable.params_bytes, stable.group), (naive.bindings, naive.params_bytes, naive.group));
+    assert_ne!(stable.stages[0].spirv, naive.stages[0].spirv);
+}
+
+#[test]
 fn every_shader_and_variant_is_listed_once() {
     let all: Vec<_> = shaders::ALL.iter().map(|shader| (shader.name, shader.variant)).collect();
     let expected = [
@@ -206,6 +213,11 @@ fn every_shader_and_variant_is_listed_once() {
         ("glints", "method=counted,occlusion=none"),
         ("glints", "method=smooth,occlusion=bvh"),
         ("glints", "method=smooth,occlusion=none"),
+        // Passes with naive forms have a twin for each variant.
+        ("glints_naive", "method=counted,occlusion=bvh"),
+        ("glints_naive", "method=counted,occlusion=none"),
+        ("glints_naive", "method=smooth,occlusion=bvh"),
+        ("glints_naive", "method=smooth,occlusion=none"),
         ("layouts", ""),
         ("mesh", ""),
         ("tonemap", ""),

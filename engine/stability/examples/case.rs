@@ -1,12 +1,12 @@
 //! Measures hard cases by their numbers on the best device there is: `cargo run -p mica-stability --example case -- H05`.
 
-use mica_gpu::{Device, DeviceOptions, Executor};
+use mica_gpu::{Device, DeviceOptions, Executor, Validation};
 use mica_stability::{CASES, Effort, Laboratory};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let wanted: Vec<String> = std::env::args().skip(1).collect();
-    let device = Device::new(&DeviceOptions { validation: true, ..DeviceOptions::default() })?;
+    let device = Device::new(&DeviceOptions { validation: Validation::Synchronization, ..DeviceOptions::default() })?;
     let mut executor = Executor::new(device.clone())?;
     for case in CASES.iter().filter(|case| wanted.is_empty() || wanted.iter().any(|id| id == case.id)) {
         println!("{} {}", case.id, case.title);

@@ -16,3 +16,10 @@ fn worst(values: &[f32], truth: &[f64], error: impl Fn(f64, f64) -> f64) -> f64 
     let errors = values.iter().zip(truth).map(|(value, truth)| error(f64::from(*value), *truth));
     errors.fold(0.0, |worst, error| if error.is_nan() { f64::INFINITY } else { worst.max(error) })
 }
+
+/// The share of answers that are not the truth.
+pub fn share_wrong<T: PartialEq>(answers: &[T], truth: &[T]) -> f64 {
+    assert_eq!(answers.len(), truth.len(), "an answer for each truth");
+    let wrong = answers.iter().zip(truth).filter(|(answer, truth)| answer != truth).count();
+    wrong as f64 / truth.len().max(1) as f64
+}

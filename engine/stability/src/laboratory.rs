@@ -1,8 +1,9 @@
 //! A device on which formulas are asked.
 
 use crate::StabilityError;
+use crate::flushed::flushed;
 use mica_gpu::{Executor, Timing};
-use mica_graph::{Buffer, Graph};
+use mica_graph::{Buffer, Download, Graph};
 use mica_shaders::types::{Operands, Words};
 
 /// How many inputs are tried.
@@ -48,6 +49,21 @@ impl Laboratory<'_> {
         self.answers(operands, declare)
     }
 
+    /// As [`Laboratory::floats`] on a device that makes 0 of every float below a threshold.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn flushed_floats(
+        &mut self,
+        operands: &[Operands],
+        below: f32,
+        declare: impl FnOnce(&mut Graph, &Buffer, &mut Buffer, u32),
+    ) -> Result<Vec<f32>, StabilityError> {
+        let (graph, download) = asking::<Operands, f32>(operands, declare);
+        let bytes = self.executor.run(flushed(&graph, below), Timing::Overlapped)?.take(download);
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
     /// What a formula of `rungs/bits` makes of each pair of words, likewise: four words for each.
     ///
     /// # Errors
@@ -60,20 +76,50 @@ impl Laboratory<'_> {
         self.answers(words, declare)
     }
 
+    /// What a pass adds up of so many questions in so many words, which are 0 before it.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn totals<Q: bytemuck::NoUninit>(
+        &mut self,
+        questions: &[Q],
+        words: usize,
+        declare: impl FnOnce(&mut Graph, &Buffer, &mut Buffer, u32),
+    ) -> Result<Vec<u32>, StabilityError> {
+        let mut graph = Graph::new();
+        let mut asked = graph.buffer("questions", size_of_val(questions) as u64);
+        graph.upload(&mut asked, bytemuck::cast_slice::<Q, u8>(questions));
+        let mut totals = graph.buffer("totals", (size_of::<u32>() * words) as u64);
+        graph.fill(&mut totals, 0);
+        declare(&mut graph, &asked, &mut totals, questions.len() as u32);
+        let download = graph.download(&totals);
+        let bytes = self.executor.run(graph, Timing::Overlapped)?.take(download);
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
     fn answers<Q: bytemuck::NoUninit, A: bytemuck::Pod>(
         &mut self,
         questions: &[Q],
         declare: impl FnOnce(&mut Graph, &Buffer, &mut Buffer, u32),
     ) -> Result<Vec<A>, StabilityError> {
-        let mut graph = Graph::new();
-        let mut asked = graph.buffer("questions", size_of_val(questions) as u64);
-        graph.upload(&mut asked, bytemuck::cast_slice::<Q, u8>(questions));
-        let mut answers = graph.buffer("answers", (size_of::<A>() * questions.len()) as u64);
-        declare(&mut graph, &asked, &mut answers, questions.len() as u32);
-        let download = graph.download(&answers);
+        let (graph, download) = asking::<Q, A>(questions, declare);
         let bytes = self.executor.run(graph, Timing::Overlapped)?.take(download);
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
+}
+
+/// A frame that asks a list of questions, and what its answers are asked for by.
+fn asking<Q: bytemuck::NoUninit, A>(
+    questions: &[Q],
+    declare: impl FnOnce(&mut Graph, &Buffer, &mut Buffer, u32),
+) -> (Graph, Download) {
+    let mut graph = Graph::new();
+    let mut asked = graph.buffer("questions", size_of_val(questions) as u64);
+    graph.upload(&mut asked, bytemuck::cast_slice::<Q, u8>(questions));
+    let mut answers = graph.buffer("answers", (size_of::<A>() * questions.len()) as u64);
+    declare(&mut graph, &asked, &mut answers, questions.len() as u32);
+    let download = graph.download(&answers);
+    (graph, download)
 }
 
 /// The pass of a formula in `rungs/arithmetic`, for [`Laboratory::floats`].

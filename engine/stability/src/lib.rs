@@ -5,15 +5,26 @@
 //! is in f64 and written independently. A case holds if every stable form stays within its tolerance; it has *teeth*
 //! if every naive form does not, as otherwise the inputs would not be hard.
 
+mod canaries;
 mod cases;
+mod count_law;
 mod errors;
+mod flushed;
 mod laboratory;
+mod plane;
 mod random;
+mod rays;
+mod stage;
+mod sweeps;
+mod unary;
 
+pub use canaries::{Canary, canaries};
 pub use cases::CASES;
-pub use errors::{worst_difference, worst_ratio};
+pub use errors::{share_wrong, worst_difference, worst_ratio};
 pub use laboratory::{Effort, Laboratory};
 pub use random::Random;
+pub use sweeps::{Axis, MakeSweep, SWEEPS, Series, Sweep};
+pub use unary::{UnaryLine, unary};
 
 use serde::{Deserialize, Serialize};
 

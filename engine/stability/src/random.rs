@@ -41,3 +41,13 @@ pub fn turned(axis: DVec3, angle: f64, turn: f64) -> DVec3 {
     let (x, y) = axis.any_orthonormal_pair();
     angle.cos() * axis + angle.sin() * (turn.cos() * x + turn.sin() * y)
 }
+
+/// A direction as a device gets it, and a number beside it.
+pub fn rounded(v: DVec3, w: f64) -> [f32; 4] {
+    [v.x as f32, v.y as f32, v.z as f32, w as f32]
+}
+
+/// The direction that a device got, in f64, of length 1 as it should be.
+pub fn unit(v: [f32; 4]) -> DVec3 {
+    DVec3::new(v[0].into(), v[1].into(), v[2].into()).normalize()
+}

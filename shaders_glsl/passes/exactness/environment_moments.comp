@@ -2,6 +2,7 @@
 // small bright lights that were taken out of the environment by the number of flakes that are lit.
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "shared/footprint_area.glsl"
 #include "shared/glint_surface.glsl"
 #include "shared/lit_probability.glsl"
 #include "shared/two_moments.glsl"
@@ -57,7 +58,7 @@ void main() {
   GlintSurface surface = glint_surface(pixel, seen);
   mat3 from_local = frame_about(surface.normal);
   vec3 o = surface.o;
-  float area = abs(surface.uv_dx.x * surface.uv_dy.y - surface.uv_dx.y * surface.uv_dy.x);
+  float area = footprint_area(surface.uv_dx, surface.uv_dy);
   float expected = area * params.flakes;
   uint word = hash(pixel.x, pixel.y, params.seed);
   float count = binomial(params.flakes, min(area, 1.0), word);

@@ -1,6 +1,6 @@
-// The chance of any success, through log(1 - p) and 1 - exp by series.
-#include "shared/binomial.glsl"
+// The chance of any success, through log(1 - p) and 1 - exp by series; a.x is n, a.y is p.
+#include "shared/chances.glsl"
 
 float value(vec4 a, vec4 b, vec4 c) {
-  return one_minus_exp(a.x * log_one_minus(a.y));
+  return chance_of_any(a.x, a.y);
 }

@@ -2,5 +2,5 @@
 #include "shared/footprint_ellipse.glsl"
 
 float value(vec4 a, vec4 b, vec4 c) {
-  return footprint_ellipse(a.xy, a.zw).minor;
+  return footprint_axes(a.xy, a.zw).y;
 }

@@ -1,7 +1,7 @@
-// Splits two coordinates into tiles and what is left: the words of floor(x) as integers, those of x - floor(x) as floats.
+// Splits two coordinates into cells and what is left: the words of their indices, and of what is left as floats.
+#include "shared/cells.glsl"
 
 uvec4 answer(uvec4 a, uvec4 b) {
   vec2 x = uintBitsToFloat(a.xy);
-  vec2 tile = floor(x);
-  return uvec4(uvec2(ivec2(tile)), floatBitsToUint(min(x - tile, 0.99999994)));
+  return uvec4(uvec2(cell_of(x)), floatBitsToUint(within_cell(x)));
 }

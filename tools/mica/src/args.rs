@@ -1,7 +1,9 @@
 //! The command line: what may be typed, and what it means.
 
+use crate::bench::BenchArgs;
 use crate::budget::BudgetArgs;
 use crate::change::Change;
+use crate::render_help;
 use crate::stability::StabilityArgs;
 use crate::study::Lighting;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -145,11 +147,7 @@ impl SceneArgs {
 
 /// `mica render`.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Two runs of the same command give the same bytes in every .exr and .png, so these hold no times: \
-                        an .exr says scene, method, settings, camera, environment, lights, samples and device in its \
-                        attributes; times are in the table and in --json."
-)]
+#[command(after_help = render_help::SAME_BYTES, after_long_help = render_help::at_length())]
 pub struct RenderArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -189,69 +187,6 @@ pub struct ExplainArgs {
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
-}
-
-/// `mica bench`.
-#[derive(Debug, Args)]
-#[command(
-    after_long_help = "Without --occlusion, every method with every rung of its ladder (see `mica methods`) at every scene, size and \
-    lighting. The time of glints is that of a frame with them less that of the same frame without, in turns in one \
-    run: processor time of the process where the device is the processor, timestamps of the device elsewhere. Figures \
-    are medians over the rounds of three sittings, between which all other points of the place are timed; after ± (+a/-b where these differ by more than a third) stands what rounds and \
-    sittings differ by, and no less than 5 % of the frame. Tables are those a method makes anew when a setting changes, without the compilation of \
-    shaders."
-)]
-pub struct BenchArgs {
-    /// What blocks rays: each body that the device offers, on the same rays in the same run. How long it takes to be
-    /// ready, how many bytes it keeps, how many rays a second it answers, and how often the bodies disagree.
-    #[arg(long, conflicts_with_all = ["method", "lighting"])]
-    pub occlusion: bool,
-    /// The tables and figures of a paper for this implementation, with the paper's own numbers and hardware beside them:
-    /// of Wang, Deng and Holzschuch 2020, Tables 1 to 3 and Figures 9 and 10, on shoe, snow and cloth up to 1920x1080.
-    #[arg(long, value_enum, conflicts_with_all = ["occlusion", "method", "lighting"])]
-    pub paper: Option<Paper>,
-    /// Embedded scenes or .gltf or .glb files. Default: shoe; with --occlusion drift too, with its million triangles.
-    #[arg(value_name = "SCENE")]
-    pub scene: Vec<PathBuf>,
-    /// A method to measure, with all its rungs (repeatable). Default: all.
-    #[arg(long, value_name = "NAME")]
-    pub method: Vec<String>,
-    /// Which of a scene's lights shine (repeatable): all its `own`, its `lights` without the environment, or its
-    /// `environment` without the lights.
-    #[arg(long, value_enum, default_values_t = [Lighting::Own])]
-    pub lighting: Vec<Lighting>,
-    /// With --occlusion: rays from what the camera sees, into all directions, and as many at most towards the first light.
-    #[arg(long, value_name = "N", default_value_t = 1 << 18, value_parser = clap::value_parser!(u32).range(1..), requires = "occlusion", conflicts_with_all = ["method", "lighting", "paper"])]
-    pub rays: u32,
-    /// Rounds of a sitting, of which there are three, after frames that warm up: fewer, but at least two, where they take
-    /// more than 7 seconds.
-    /// With --occlusion all of them, and each builds everything anew.
-    #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    pub rounds: u32,
-    /// Size of the picture in pixels (repeatable). Default: 640x360; with --occlusion, one ray of the camera passes
-    /// through each pixel of 1280x720.
-    #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true)]
-    pub size: Vec<[u32; 2]>,
-    /// Appends a line of JSON for each point, and measures no point that is there already; with --occlusion, writes one
-    /// for each scene and body. `-` is stdout, in place of the table.
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
-    /// A device, by its number or a part of its name or of its driver's name and version (see `mica doctor`). Default:
-    /// the best there is.
-    #[arg(long, value_name = "NAME|INDEX")]
-    pub device: Option<String>,
-    /// Most device memory to take, as in `mica render`.
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(16..=1 << 30))]
-    pub memory: Option<u64>,
-    /// Keeps pipelines there. Default: `mica` in the user's cache folder.
-    #[arg(long, value_name = "DIR", conflicts_with = "no_cache")]
-    pub cache: Option<PathBuf>,
-    /// Keeps nothing and uses nothing that was kept.
-    #[arg(long)]
-    pub no_cache: bool,
-    /// Prints neither table nor progress.
-    #[arg(long)]
-    pub quiet: bool,
 }
 
 /// `mica accuracy`.
@@ -360,6 +295,9 @@ pub struct DoctorArgs {
     /// there is.
     #[arg(long, value_name = "NAME|INDEX")]
     pub device: Option<String>,
+    /// Ask the device what its arithmetic does, and say what that means for results.
+    #[arg(long)]
+    pub canaries: bool,
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
@@ -420,12 +358,6 @@ pub enum OcclusionChoice {
     None,
 }
 
-/// A paper whose tables are drawn anew.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Paper {
-    Wdh20,
-}
-
 /// What is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum TimingChoice {
@@ -457,7 +389,7 @@ fn chart(text: &str) -> Result<Chart, String> {
     Chart::ALL.into_iter().find(|chart| chart.name() == text).ok_or_else(|| format!("expected one of {}", names()))
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
+pub fn size(text: &str) -> Result<[u32; 2], String> {
     let wanted = || format!("expected WIDTHxHEIGHT, each 1 to {LARGEST_SIDE}, such as 1920x1080");
     let (width, height) = text.split_once(['x', 'X']).ok_or_else(wanted)?;
     let side = |text: &str| text.parse().ok().filter(|side| (1..=LARGEST_SIDE).contains(side)).ok_or_else(wanted);

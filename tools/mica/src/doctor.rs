@@ -7,15 +7,23 @@ use crate::progress::Progress;
 use crate::session::Session;
 use crate::table;
 use clap::Parser;
-use mica_gpu::{Device, DeviceInfo, DeviceKind, DeviceOptions, Error, Timing, devices};
+use mica_gpu::{Device, DeviceInfo, DeviceKind, DeviceOptions, Error, Executor, Timing, devices};
 use mica_render::OcclusionBackend;
+use mica_stability::{Canary, Effort, Laboratory, StabilityError};
 use serde::Serialize;
 use std::ffi::OsString;
 use std::time::Instant;
 
 /// Prints what was found, and fails if a render would.
 pub fn doctor(args: &DoctorArgs) -> Result<(), Failure> {
-    let report = examine(args);
+    let mut report = examine(args);
+    let mut failed = None;
+    if args.canaries && report.works {
+        match canaries(args) {
+            Ok(found) => report.canaries = Some(found),
+            Err(failure) => failed = Some(failure),
+        }
+    }
     if args.json {
         output::print_json(&report)?;
     } else {
@@ -25,7 +33,7 @@ pub fn doctor(args: &DoctorArgs) -> Result<(), Failure> {
         Trial { error: Some(error), .. } => {
             Err(Failure::with_code(NO_DEVICE, format!("a render would not work here: {error}")))
         }
-        _ => Ok(()),
+        _ => failed.map_or(Ok(()), Err),
     }
 }
 
@@ -41,6 +49,9 @@ struct DoctorReport {
     validation: Validation,
     missing: Vec<Missing>,
     trial: Trial,
+    /// What the arithmetic of the device does that was tried, where that was asked and a render works.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    canaries: Option<Vec<Canary>>,
 }
 
 #[derive(Serialize)]
@@ -137,7 +148,7 @@ fn examine(args: &DoctorArgs) -> DoctorReport {
         }
         _ => {}
     }
-    let validated = Device::new(&DeviceOptions { select: args.device.clone(), validation: true });
+    let validated = Device::new(&DeviceOptions { select: args.device.clone(), validation: mica_gpu::Validation::Core });
     let validation =
         Validation { present: validated.is_ok(), error: validated.as_ref().err().map(ToString::to_string) };
     if let Err(Error::NoValidation(_)) = validated {
@@ -157,7 +168,19 @@ fn examine(args: &DoctorArgs) -> DoctorReport {
         validation,
         missing,
         trial,
+        canaries: None,
     }
+}
+
+/// Asks the device that was tried.
+fn canaries(args: &DoctorArgs) -> Result<Vec<Canary>, Failure> {
+    let device = Device::new(&DeviceOptions { select: args.device.clone(), ..DeviceOptions::default() })?;
+    let mut executor = Executor::new(device)?;
+    let mut laboratory = Laboratory { executor: &mut executor, effort: Effort::Quick };
+    mica_stability::canaries(&mut laboratory).map_err(|error| match error {
+        StabilityError::Gpu(error) => error.into(),
+        error => Failure::with_code(NO_DEVICE, error.to_string()),
+    })
 }
 
 /// Renders 16 by 16 pixels of a sphere through all passes, with small tables, and looks at what came back.
@@ -247,6 +270,9 @@ fn for_people(report: &DoctorReport) -> String {
             report.occlusion.body
         ),
     };
+    for Canary { name, question, found, means } in report.canaries.iter().flatten() {
+        text += &format!("canary {name}: {question}\n  {found}\n  {means}\n");
+    }
     text += if report.works { "A render works here.\n" } else { "A render does not work here.\n" };
     text
 }

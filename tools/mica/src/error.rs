@@ -1,12 +1,18 @@
 //! What ends a command early: one line for people, and the exit code that scripts see.
 
-use mica_render::{RenderError, SettingError, scene::SceneError};
+use mica_render::{
+    RenderError, SettingError,
+    scene::{SceneError, SceneErrorCode},
+};
+use mica_stability::StabilityError;
 use std::fmt;
 
 /// Bad input or usage.
 pub const BAD_INPUT: u8 = 2;
 /// No usable device or driver.
 pub const NO_DEVICE: u8 = 3;
+/// Out of memory, or the device was lost.
+pub const NO_MEMORY: u8 = 4;
 /// Ended by Ctrl-C.
 pub const INTERRUPTED: u8 = 130;
 
@@ -38,7 +44,8 @@ impl fmt::Display for Failure {
 
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Self {
-        Self::bad_input(error.to_string())
+        let code = if error.code == SceneErrorCode::OutOfMemory { NO_MEMORY } else { BAD_INPUT };
+        Self::with_code(code, error.to_string())
     }
 }
 
@@ -71,6 +78,19 @@ impl From<RenderError> for Failure {
             RenderError::Gpu(error) => error.into(),
             error @ RenderError::Bvh(_) => Self::bad_input(format!("{error}; or render with --occlusion none")),
             error => Self::bad_input(error.to_string()),
+        }
+    }
+}
+
+impl From<StabilityError> for Failure {
+    fn from(error: StabilityError) -> Self {
+        match error {
+            StabilityError::Gpu(error) => error.into(),
+            StabilityError::Render(error) => error.into(),
+            StabilityError::Setting(error) => error.into(),
+            StabilityError::Scene(error) => error.into(),
+            StabilityError::Missing(what) => Self::with_code(NO_DEVICE, what),
+            StabilityError::Oracle(error) => Self::bad_input(error.to_string()),
         }
     }
 }

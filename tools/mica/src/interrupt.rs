@@ -1,7 +1,9 @@
-//! Ctrl-C: ends at once while there is nothing to lose, and otherwise after the frame under way.
+//! Ctrl-C, and its like of other programs: ends at once while there is nothing to lose, and otherwise after the frame under
+//! way.
 
 use crate::error::{Failure, INTERRUPTED};
-use signal_hook::consts::SIGINT;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::flag;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -13,21 +15,20 @@ pub struct Interrupt {
 }
 
 impl Interrupt {
-    /// Ctrl-C ends the process at once, with the code for it.
+    /// Ctrl-C, or a polite request to end, ends the process at once, with the code for it.
     pub fn new() -> Result<Self, Failure> {
         let interrupt = Self { at_once: Arc::new(AtomicBool::new(true)), requested: Arc::default() };
-        let register = || {
-            // In this order: the first Ctrl-C of a graceful section does not end the process, the second does.
-            signal_hook::flag::register_conditional_shutdown(
-                SIGINT,
-                i32::from(INTERRUPTED),
-                interrupt.at_once.clone(),
-            )?;
-            signal_hook::flag::register(SIGINT, interrupt.at_once.clone())?;
-            signal_hook::flag::register(SIGINT, interrupt.requested.clone())
+        let register = |signal| {
+            let Self { at_once, requested } = &interrupt;
+            // In this order: the first one of a graceful section does not end the process, the second does.
+            flag::register_conditional_shutdown(signal, i32::from(INTERRUPTED), at_once.clone())?;
+            flag::register(signal, at_once.clone())?;
+            flag::register(signal, requested.clone())
         };
-        match register() {
-            Ok(_) => Ok(interrupt),
+        // A terminal that is closed, unless `nohup` asked for that to be survived.
+        let hangup = (!is_ignored(SIGHUP)).then_some(SIGHUP);
+        match [SIGINT, SIGTERM].into_iter().chain(hangup).try_for_each(|signal| register(signal).map(|_| ())) {
+            Ok(()) => Ok(interrupt),
             Err(error) => Err(Failure::bad_input(format!("Ctrl-C cannot be handled: {error}"))),
         }
     }
@@ -40,5 +41,24 @@ impl Interrupt {
     /// Whether Ctrl-C was pressed.
     pub fn requested(&self) -> bool {
         self.requested.load(Ordering::SeqCst)
+    }
+}
+
+/// Whether who started the process had a signal ignored, by the mask that Linux shows; elsewhere it is taken for no.
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_ignored;
+    use signal_hook::consts::{SIGPIPE, SIGSEGV};
+
+    #[test]
+    fn what_is_ignored_is_known() {
+        // Rust ignores the one before `main`, and handles the other.
+        assert!(is_ignored(SIGPIPE) && !is_ignored(SIGSEGV));
     }
 }

@@ -21,6 +21,7 @@ mod page;
 mod picture;
 mod progress;
 mod render;
+mod render_help;
 mod report;
 mod report_text;
 mod scene_choice;
@@ -32,17 +33,25 @@ mod table;
 
 use args::{Cli, Command};
 use clap::Parser;
-use error::{BAD_INPUT, Failure, one_line};
+use error::{BAD_INPUT, Failure, NO_MEMORY, one_line};
+use interrupt::Interrupt;
+use signal_hook::consts::SIGABRT;
 use std::io::Write;
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 fn main() -> ExitCode {
     show_warnings();
     quiet_loader_panics();
-    let done = match Cli::try_parse() {
-        Ok(cli) => dispatch(&cli.command),
-        Err(error) => usage(&error),
-    };
+    end_aborts_with_a_code();
+    let done = Interrupt::new().and_then(|interrupt| {
+        output::survive_size_limits()?;
+        match Cli::try_parse() {
+            Ok(cli) => dispatch(&cli.command, &interrupt),
+            Err(error) => usage(&error),
+        }
+    });
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
@@ -53,17 +62,17 @@ fn main() -> ExitCode {
     }
 }
 
-fn dispatch(command: &Command) -> Result<(), Failure> {
+fn dispatch(command: &Command, interrupt: &Interrupt) -> Result<(), Failure> {
     match command {
-        Command::Render(args) => render::render(args),
+        Command::Render(args) => render::render(args, interrupt),
         Command::Scenes(args) => scenes::scenes(args),
         Command::Methods(args) => methods::methods(args),
         Command::Explain(args) => explain::explain(args),
-        Command::Bench(args) => bench::bench(args),
-        Command::Accuracy(args) => accuracy::accuracy(args),
+        Command::Bench(args) => bench::bench(args, interrupt),
+        Command::Accuracy(args) => accuracy::accuracy(args, interrupt),
         Command::Doctor(args) => doctor::doctor(args),
         Command::Oracle(args) => oracle::oracle(args),
-        Command::Stability(args) => stability::stability(args),
+        Command::Stability(args) => stability::stability(args, interrupt),
     }
 }
 
@@ -85,11 +94,16 @@ fn usage(error: &clap::Error) -> Result<(), Failure> {
     Err(Failure::with_code(BAD_INPUT, line.collect::<Vec<_>>().join("; ")))
 }
 
-/// The library's log on stderr, warnings and errors unless `RUST_LOG` says otherwise.
+/// The library's log on stderr, warnings and errors unless `RUST_LOG` says otherwise. Of a cache that cannot be used the first
+/// line says all.
 fn show_warnings() {
+    let not_kept = AtomicBool::new(false);
     let env = env_logger::Env::default().default_filter_or("warn");
     env_logger::Builder::from_env(env)
-        .format(|to, record| {
+        .format(move |to, record| {
+            if record.target() == mica_gpu::NOT_KEPT && not_kept.swap(true, Ordering::Relaxed) {
+                return Ok(());
+            }
             let level = match record.level() {
                 log::Level::Warn => "warning".to_owned(),
                 level => level.as_str().to_lowercase(),
@@ -104,10 +118,18 @@ fn show_warnings() {
 fn quiet_loader_panics() {
     let default = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
-        if std::thread::current().name() == Some(scene_choice::LOADER) {
+        if scene_choice::reads() {
             log::debug!("{info}");
         } else {
             default(info);
         }
     }));
+}
+
+/// An allocation that fails, here or in a driver, says so in one line and aborts: scripts shall see the code for it.
+fn end_aborts_with_a_code() {
+    let always = Arc::new(AtomicBool::new(true));
+    if let Err(error) = signal_hook::flag::register_conditional_shutdown(SIGABRT, i32::from(NO_MEMORY), always) {
+        log::debug!("aborts end as they do: {error}");
+    }
 }

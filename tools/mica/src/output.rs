@@ -1,10 +1,12 @@
 //! Where results go: stdout, and files that are written whole or not at all.
 
 use crate::error::Failure;
+use signal_hook::consts::SIGXFSZ;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
+use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::Arc;
 
 /// Prints to stdout. A reader that has seen enough is no failure.
 pub fn print(text: &str) -> Result<(), Failure> {
@@ -27,6 +29,29 @@ pub fn json(report: &impl serde::Serialize) -> Result<String, Failure> {
     serde_json::to_string_pretty(report).map_err(|error| Failure::bad_input(format!("the report is no JSON: {error}")))
 }
 
+/// A file that may not grow any further (`ulimit -f`) is a write that fails, and not the end of the process.
+pub fn survive_size_limits() -> Result<(), Failure> {
+    let handled = signal_hook::flag::register(SIGXFSZ, Arc::default());
+    handled.map(|_| ()).map_err(|error| Failure::bad_input(format!("limits of files cannot be handled: {error}")))
+}
+
+/// Refuses names that would be more than one line where they are printed: what lists or scripts make of them is anyone's
+/// guess.
+pub fn check_name(path: &Path) -> Result<(), Failure> {
+    match path.file_name() {
+        Some(name) if name.to_string_lossy().contains(char::is_control) => {
+            Err(Failure::bad_input(format!("{}: has a control character in its name; leave it out", path.display())))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Makes a folder, and those above it, where they are not there.
+pub fn make_folder(path: &Path) -> Result<(), Failure> {
+    check_name(path)?;
+    fs::create_dir_all(path).map_err(|error| Failure::bad_input(format!("{}: {error}; name a folder", path.display())))
+}
+
 /// A file to be written, that could be written when it was checked.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Destination {
@@ -40,11 +65,18 @@ pub struct Destination {
 impl Destination {
     /// Checks, before any work is done, that the file can be written; leaves the old one as it is.
     pub fn check(path: &Path) -> Result<Self, Failure> {
+        check_name(path)?;
         let failed = |why: &str| Failure::bad_input(format!("{}: {why}", path.display()));
         let replaced = match fs::metadata(path) {
             Ok(found) if found.is_dir() => return Err(failed("is a folder; name a file in it")),
-            Ok(found) if found.is_file() => Some(path.canonicalize().map_err(|error| failed(&error.to_string()))?),
-            Ok(_) => None,
+            Ok(found) => {
+                // Opening a pipe would wait for its reader.
+                if !found.file_type().is_fifo() {
+                    open(path).map_err(|error| failed(&format!("cannot be written: {error}")))?;
+                }
+                let file = found.is_file().then(|| path.canonicalize()).transpose();
+                file.map_err(|error| failed(&error.to_string()))?
+            }
             Err(error) if error.kind() == ErrorKind::NotFound => Some(path.to_owned()),
             Err(error) => return Err(failed(&error.to_string())),
         };
@@ -52,14 +84,11 @@ impl Destination {
             if replaced.file_name().is_none() {
                 return Err(failed("names no file"));
             }
-            let folder = folder_of(replaced);
+            let folder = mica_files::folder_of(replaced);
             if !folder.is_dir() {
                 return Err(failed(&format!("there is no folder {}; make it first", folder.display())));
             }
-            let probe = temporary_beside(replaced);
-            File::create_new(&probe)
-                .and_then(|_| fs::remove_file(&probe))
-                .map_err(|error| failed(&format!("its folder cannot be written: {error}")))?;
+            mica_files::probe(replaced).map_err(|error| failed(&format!("its folder cannot be written: {error}")))?;
         }
         Ok(Self { path: path.to_owned(), replaced })
     }
@@ -67,40 +96,16 @@ impl Destination {
     /// Writes the file: under another name first, which then takes its place once every byte is on the disk.
     pub fn write(&self, bytes: &[u8]) -> Result<(), Failure> {
         let written = match &self.replaced {
-            Some(replaced) => replace(replaced, bytes),
-            None => File::options().write(true).open(&self.path).and_then(|mut file| file.write_all(bytes)),
+            Some(replaced) => mica_files::replace(replaced, &[bytes]),
+            None => open(&self.path).and_then(|mut file| file.write_all(bytes)),
         };
         written.map_err(|error| Failure::bad_input(format!("{} cannot be written: {error}", self.path.display())))
     }
 }
 
-fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let temporary = temporary_beside(path);
-    let written = File::create_new(&temporary)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
-        .and_then(|()| fs::rename(&temporary, path));
-    match written {
-        Ok(()) => {
-            // The folder too, so that a crash does not bring the old file back. Not every file system can.
-            let _ = File::open(folder_of(path)).and_then(|folder| folder.sync_all());
-            Ok(())
-        }
-        Err(error) => {
-            let _ = fs::remove_file(&temporary);
-            Err(error)
-        }
-    }
-}
-
-fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// A name that nobody uses, in the same folder: only there a rename is atomic.
-fn temporary_beside(path: &Path) -> PathBuf {
-    static NEXT: AtomicU32 = AtomicU32::new(0);
-    let number = NEXT.fetch_add(1, Ordering::Relaxed);
-    folder_of(path).join(format!(".mica-{}-{number}.tmp", std::process::id()))
+/// Opens what is there, and leaves it as it is until it is written into.
+fn open(path: &Path) -> io::Result<File> {
+    File::options().write(true).open(path)
 }
 
 #[cfg(test)]
@@ -140,8 +145,12 @@ mod tests {
         let file = folder.path().join("file");
         fs::write(&file, "x").expect("a file");
         let long = folder.path().join("x".repeat(300));
+        let socket = folder.path().join("socket");
+        let _listening = std::os::unix::net::UnixListener::bind(&socket).expect("a socket");
+        let [newline, nul] = ["a\nb", "a\0b"].map(|name| folder.path().join(name));
+        let missing = folder.path().join("missing/a");
         for bad in
-            [folder.path(), &folder.path().join("missing/a"), &file.join("a"), &long, Path::new(""), Path::new("..")]
+            [folder.path(), &missing, &file.join("a"), &long, &socket, &newline, &nul, Path::new(""), Path::new("..")]
         {
             assert!(Destination::check(bad).is_err(), "{}", bad.display());
         }

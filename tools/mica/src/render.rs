@@ -22,13 +22,12 @@ use std::path::Path;
 const LEAST_WARMUP: u32 = 2;
 
 /// Renders, measures, writes and prints.
-pub fn render(args: &RenderArgs) -> Result<(), Failure> {
+pub fn render(args: &RenderArgs, interrupt: &Interrupt) -> Result<(), Failure> {
     let outputs = Outputs::check(args)?;
-    let interrupt = Interrupt::new()?;
     let mut progress = Progress::new(args.quiet);
     let (mut session, budget) = match args.budget.wish() {
         Some(wish) => {
-            let (session, report) = budget::choose_for(&args.scene, &wish, &interrupt, &mut progress)?;
+            let (session, report) = budget::choose_for(&args.scene, &wish, interrupt, &mut progress)?;
             (session, Some(report))
         }
         None => (Session::new(&args.scene, &mut progress)?, None),
@@ -38,7 +37,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     }
 
     let mut updates = Vec::new();
-    let mut work = Work { session: &mut session, interrupt: &interrupt, progress: &mut progress, frames: 0 };
+    let mut work = Work { session: &mut session, interrupt, progress: &mut progress, frames: 0 };
     work.update(0, None, &mut updates)?;
     for (frame, edit) in (1..).zip(&args.edit) {
         edit.apply(&mut work.session.renderer)?;

@@ -5,10 +5,19 @@ use crate::progress::Progress;
 use mica_render::scene::{Scene, SceneError};
 use mica_render::{EMBEDDED_SCENES, embedded_scene};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
 /// Name of the thread that reads what the user gave.
-pub const LOADER: &str = "loader";
+const LOADER: &str = "loader";
+/// How many of them there are.
+static READING: AtomicUsize = AtomicUsize::new(0);
+
+/// Whether this thread reads what the user gave: the loader itself, or one that helps it.
+pub fn reads() -> bool {
+    // The main thread, which waits for the loader, is the only other one meanwhile.
+    READING.load(Ordering::SeqCst) > 0 && std::thread::current().name() != Some("main")
+}
 
 /// A scene, and where it came from.
 pub struct ChosenScene {
@@ -60,14 +69,18 @@ pub fn on_loader<T: Send + 'static>(
     read: impl FnOnce() -> Result<T, SceneError> + Send + 'static,
 ) -> Result<T, Failure> {
     let (to, from) = mpsc::channel();
+    READING.fetch_add(1, Ordering::SeqCst);
     let thread = std::thread::Builder::new().name(LOADER.to_owned()).spawn(move || {
         // The receiver waits as long as this thread lives.
         let _ = to.send(read());
     });
     if let Err(error) = thread {
+        READING.fetch_sub(1, Ordering::SeqCst);
         return Err(Failure::bad_input(format!("{what}: no thread to read it on: {error}")));
     }
-    match progress.wait(&format!("reading {what}"), from) {
+    let result = progress.wait(&format!("reading {what}"), from);
+    READING.fetch_sub(1, Ordering::SeqCst);
+    match result {
         Some(result) => Ok(result?),
         None => Err(Failure::bad_input(format!(
             "{what}: the loader gave up on it (run with RUST_LOG=debug for details); check the file, and report it if \

@@ -8,8 +8,8 @@ use crate::occlusion_choice;
 use crate::picture::Picture;
 use crate::progress::Progress;
 use crate::scene_choice::{self, ChosenScene};
-use mica_gpu::{Device, DeviceInfo, DeviceKind, DeviceOptions, Executor, ExecutorOptions, Run, Timing};
-use mica_graph::{Graph, Plan};
+use mica_gpu::{Device, DeviceInfo, DeviceKind, DeviceOptions, Executor, ExecutorOptions, Run, Timing, Validation};
+use mica_graph::{Graph, Plan, Shader};
 use mica_render::scene::Camera;
 use mica_render::{Cache, Frame, LeftOut, Renderer, Update, View, method};
 use mica_shaders::types::RayCounts;
@@ -149,7 +149,9 @@ impl Session {
 
         let device = match &earlier {
             Some(executor) => executor.device().clone(),
-            None => Device::new(&DeviceOptions { select: args.device.clone(), validation: args.validation })?,
+            None => {
+                Device::new(&DeviceOptions { select: args.device.clone(), validation: validation(args.validation) })?
+            }
         };
         check_size(args.size, device.info())?;
         let triangles = chosen.scene.meshes.iter().map(|mesh| mesh.triangle_count() as u64).sum();
@@ -255,6 +257,18 @@ impl Session {
         self.execute(declared, timing, wanted)
     }
 
+    /// The same frame with other shaders in the place of some, and how many passes that exchanged.
+    pub fn look_by(
+        &mut self,
+        view: &View,
+        timing: Timing,
+        exchanged: &[[&'static Shader; 2]],
+    ) -> Result<(Shot, usize), Failure> {
+        let mut declared = self.declare_view(view, None)?;
+        let count = exchanged.iter().map(|[from, to]| declared.graph.exchange(from, to)).sum();
+        Ok((self.execute(declared, timing, Wanted { picture: true, ..Wanted::default() })?, count))
+    }
+
     fn execute(&mut self, mut declared: Declared, timing: Timing, wanted: Wanted) -> Result<Shot, Failure> {
         let updates_of = declared.updates_of();
         let Declared { graph: g, frame, .. } = &mut declared;
@@ -291,6 +305,11 @@ fn camera(choice: CameraChoice) -> Camera {
     // Depth is reversed and a float, so a near plane this close costs nothing.
     let near = 1e-6 * eye.distance(target).min(100.0);
     Camera::looking_at("command line", eye, target, vertical_fov_deg.to_radians(), near)
+}
+
+/// What `--validation` asks for.
+pub fn validation(asked: bool) -> Validation {
+    if asked { Validation::Synchronization } else { Validation::Off }
 }
 
 fn check_size(size: [u32; 2], device: &DeviceInfo) -> Result<(), Failure> {

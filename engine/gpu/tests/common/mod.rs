@@ -3,7 +3,7 @@
 
 pub mod host;
 
-use mica_gpu::{Device, DeviceOptions, Executor, ExecutorOptions, Feature, Messages};
+use mica_gpu::{Device, DeviceOptions, Executor, ExecutorOptions, Feature, Messages, Validation};
 use mica_graph::{Access, Binding, BindingKind, Resource, Shader, Slot, Stage, StageCode, Stages, Use};
 use std::io::Write;
 use std::process::{Command, Stdio};
@@ -17,7 +17,7 @@ pub struct Checked {
 
 impl Checked {
     pub fn new() -> Self {
-        let options = DeviceOptions { validation: true, ..DeviceOptions::default() };
+        let options = DeviceOptions { validation: Validation::Synchronization, ..DeviceOptions::default() };
         let device = Device::new(&options).expect("a device with validation");
         let messages = device.messages();
         Self { device: Some(device), messages }

@@ -46,6 +46,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "Descends a hierarchy over texture space and tests the normals of the flakes at its end one by one.",
     claim: Claim::Distribution,
     mean_between: [0.99, 1.01],
+    repeats: true,
     settings: &[
         Setting {
             key: "enumerated",

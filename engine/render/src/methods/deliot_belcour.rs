@@ -46,6 +46,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "Counts lit flakes on four anisotropic grids about the footprint by gated normal numbers; constant time.",
     claim: Claim::Mean,
     mean_between: [0.9, 1.12],
+    repeats: false,
     settings: &[
         Setting {
             key: "microfacet_roughness",

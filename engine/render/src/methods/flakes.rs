@@ -32,6 +32,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
               of more than `most` flakes shows what is expected of it, without fluctuation.",
     claim: Claim::Pixels,
     mean_between: [0.99, 1.01],
+    repeats: true,
     settings: &[
         Setting {
             key: "most",

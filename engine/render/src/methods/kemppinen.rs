@@ -43,6 +43,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "Visits the 32 points of an implicit 4D grid that are nearest to the footprint and the half vector.",
     claim: Claim::Mean,
     mean_between: [0.85, 1.03],
+    repeats: false,
     settings: &[
         Setting {
             key: "ndf",

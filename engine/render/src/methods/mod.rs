@@ -75,6 +75,8 @@ pub struct MethodInfo {
     /// Least and greatest that its mean may be, over the true one, where the cone is narrow beside the lobe (the grid of
     /// `tests/tests/claims.rs`).
     pub mean_between: [f64; 2],
+    /// Whether its flakes are the same in each square of texture, so that only the place within it matters.
+    pub repeats: bool,
     /// Its settings beyond those that every method has.
     pub settings: &'static [Setting],
     /// From cheap to dear.

@@ -43,6 +43,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "A lattice of sparkles in space, bent by noise and moved by the eye, where a broad lobe is lit.",
     claim: Claim::Look,
     mean_between: [0.3, 1.5],
+    repeats: false,
     settings: &[
         Setting {
             key: "share",

@@ -16,6 +16,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
               a split sum, darker than the truth at grazing views (by 38 % at 83 degrees under `overcast`, alpha .3).",
     claim: Claim::Mean,
     mean_between: [0.99, 1.01],
+    repeats: false,
     settings: &[],
     ladder: &[Rung { name: "smooth", set: &[] }],
 };

@@ -44,6 +44,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "A quadtree says how many flakes there are, a table how likely each of them is lit.",
     claim: Claim::Look,
     mean_between: [0.9, 1.1],
+    repeats: true,
     settings: &[
         Setting {
             key: "dpf",

@@ -46,6 +46,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "Sparkles of a jittered grid in space, shifted by the view and multiplied by a smooth lobe.",
     claim: Claim::Look,
     mean_between: [0.0, 2.0],
+    repeats: false,
     settings: &[
         Setting {
             key: "repaired",

@@ -45,6 +45,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "Counts of shining flakes drawn for the cells of two grids over the footprint.",
     claim: Claim::Look,
     mean_between: [0.95, 1.05],
+    repeats: false,
     settings: &[
         Setting {
             key: "cells",

@@ -95,6 +95,8 @@ codes! {
     FileTooLarge = "FILE_TOO_LARGE",
     /// The whole scene would take more memory than allowed.
     SceneTooLarge = "SCENE_TOO_LARGE",
+    /// The machine, or the limit that the process runs under, has no memory for what a file holds.
+    OutOfMemory = "OUT_OF_MEMORY",
     /// The file is none of the formats that are read.
     UnknownFormat = "UNKNOWN_FORMAT",
     /// The JSON is malformed or a value in it has the wrong type.

@@ -1,6 +1,6 @@
 //! A device under validation, and both bodies of occlusion on it, through the renderer as a program has it.
 
-use mica_gpu::{Device, DeviceOptions, Executor, Timing};
+use mica_gpu::{Device, DeviceOptions, Executor, Timing, Validation};
 use mica_graph::{Download, Graph};
 use mica_render::scene::Scene;
 use mica_render::{OcclusionBackend, Question, Renderer};
@@ -117,7 +117,8 @@ impl Bodies {
 
 /// The best device there is, with validation.
 pub fn device() -> Arc<Device> {
-    Device::new(&DeviceOptions { validation: true, ..DeviceOptions::default() }).expect("a device with validation")
+    Device::new(&DeviceOptions { validation: Validation::Synchronization, ..DeviceOptions::default() })
+        .expect("a device with validation")
 }
 
 /// Fails where validation has said something.

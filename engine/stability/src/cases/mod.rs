@@ -44,6 +44,10 @@ mod h41_integer_edges;
 mod h42_area_lights;
 mod h43_density;
 mod h44_descriptor_range;
+mod quarters;
+
+/// What the sweep over distance shows more of.
+pub(crate) use h28_energy_across_scale::{distances, expected, radiance_seen, seen_from};
 
 use crate::Case;
 

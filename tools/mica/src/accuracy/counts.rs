@@ -3,17 +3,15 @@
 use crate::args::AccuracyArgs;
 use crate::error::{Failure, INTERRUPTED};
 use crate::interrupt::Interrupt;
-use crate::output;
+use crate::output::{self, Destination};
 use crate::progress::Progress;
-use crate::session::{cache, executor};
+use crate::session::{cache, executor, validation};
 use crate::table::{Column, table};
 use mica_accuracy::{Condition, CountErrors, CountLaw, Stage, StageError};
 use mica_gpu::{Device, DeviceOptions, Executor};
 use mica_render::{Cache, MethodInfo};
 use serde_json::{Value as Json, json};
-use std::fs::File;
-use std::io::Write;
-use std::path::PathBuf;
+use std::path::Path;
 
 /// Flakes expected in a footprint, lit or not.
 const FLAKES: [f64; 7] = [0.1, 1.0, 10.0, 100.0, 1e3, 1e4, 1e5];
@@ -30,10 +28,10 @@ struct Row {
     errors: CountErrors,
 }
 
-/// Where rows go as they come.
+/// Where rows go as they come: a file that is written anew with each.
 struct Lines {
-    path: PathBuf,
-    file: File,
+    destination: Destination,
+    text: String,
 }
 
 /// Measures, writes and prints. What was measured before Ctrl-C or a failure is kept.
@@ -44,7 +42,7 @@ pub fn counts(
     progress: &mut Progress,
 ) -> Result<(), Failure> {
     let mut lines = args.output.as_deref().map(Lines::create).transpose()?;
-    let device = Device::new(&DeviceOptions { select: args.device.clone(), validation: args.validation })?;
+    let device = Device::new(&DeviceOptions { select: args.device.clone(), validation: validation(args.validation) })?;
     let described = json!({ "name": device.info().name, "driver": device.info().driver });
     let kept = cache(args.cache.as_deref(), args.no_cache);
     let mut executor = executor(device, kept.as_ref(), args.memory)?;
@@ -90,7 +88,7 @@ pub fn counts(
     if !args.quiet {
         output::print(&for_people(&rows))?;
         if let Some(lines) = &lines {
-            output::print(&format!("\n{}\n", lines.path.display()))?;
+            output::print(&format!("\n{}\n", lines.destination.path.display()))?;
         }
     }
     if interrupt.requested() {
@@ -149,17 +147,15 @@ impl From<StageError> for Failure {
 
 impl Lines {
     /// Starts `counts.jsonl` in a folder, which is made if it is not there.
-    fn create(folder: &std::path::Path) -> Result<Self, Failure> {
-        let path = folder.join("counts.jsonl");
-        let file = std::fs::create_dir_all(folder).and_then(|()| File::create(&path));
-        let file = file.map_err(|error| Failure::bad_input(format!("{}: {error}", path.display())))?;
-        Ok(Self { path, file })
+    fn create(folder: &Path) -> Result<Self, Failure> {
+        output::make_folder(folder)?;
+        Ok(Self { destination: Destination::check(&folder.join("counts.jsonl"))?, text: String::new() })
     }
 
-    /// Each line is on its way to the disk before the next is computed.
+    /// Each line is on the disk before the next is computed.
     fn add(&mut self, row: &Json) -> Result<(), Failure> {
-        let written = writeln!(self.file, "{row}").and_then(|()| self.file.flush());
-        written.map_err(|error| Failure::bad_input(format!("{} cannot be written: {error}", self.path.display())))
+        self.text += &format!("{row}\n");
+        self.destination.write(self.text.as_bytes())
     }
 }
 

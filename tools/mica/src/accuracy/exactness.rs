@@ -5,7 +5,7 @@ use crate::error::{Failure, INTERRUPTED};
 use crate::interrupt::Interrupt;
 use crate::output;
 use crate::progress::Progress;
-use crate::session::{cache, executor};
+use crate::session::{cache, executor, validation};
 use crate::study::{Lines, machine};
 use crate::table::{Column, table};
 use mica_accuracy::Machine;
@@ -25,7 +25,7 @@ pub fn exactness(
     progress: &mut Progress,
 ) -> Result<(), Failure> {
     let mut lines = args.output.as_deref().map(open).transpose()?;
-    let device = Device::new(&DeviceOptions { select: args.device.clone(), validation: args.validation })?;
+    let device = Device::new(&DeviceOptions { select: args.device.clone(), validation: validation(args.validation) })?;
     let machine = machine(device.info(), "none");
     let kept = cache(args.cache.as_deref(), args.no_cache);
     let mut executor = executor(device, kept.as_ref(), args.memory)?;
@@ -64,8 +64,7 @@ fn wanted(asked: &[Chart], there: &[ExactnessLine], machine: &Machine) -> Vec<Ch
 }
 
 fn open(folder: &Path) -> Result<Lines<ExactnessLine>, Failure> {
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Failure::bad_input(format!("{}: {error}; name a folder", folder.display())))?;
+    output::make_folder(folder)?;
     let mut lines = Lines::<ExactnessLine>::open(&folder.join(FILE))?;
     lines.all.retain(|line| line.schema == EXACTNESS_SCHEMA);
     Ok(lines)

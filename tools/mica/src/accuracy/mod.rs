@@ -14,7 +14,7 @@ use mica_render::{METHODS, MethodInfo, method};
 use std::path::Path;
 
 /// Does what was asked for.
-pub fn accuracy(args: &AccuracyArgs) -> Result<(), Failure> {
+pub fn accuracy(args: &AccuracyArgs, interrupt: &Interrupt) -> Result<(), Failure> {
     if let (true, Some(folder)) = (args.redraw, &args.output) {
         return draw(args, folder);
     }
@@ -25,14 +25,13 @@ pub fn accuracy(args: &AccuracyArgs) -> Result<(), Failure> {
         ));
     }
     let methods = chosen(&args.method)?;
-    let interrupt = Interrupt::new()?;
     let mut progress = Progress::new(args.quiet);
     if let Some(folder) = args.output.as_deref().filter(|_| is_study) {
         let mut folder = Folder::open(folder)?;
-        let points = study::study(args, &mut folder, &methods, &interrupt, &mut progress);
+        let points = study::study(args, &mut folder, &methods, interrupt, &mut progress);
         // Who asks for certain methods or scenes asks for nothing else.
         let whole = args.scene.is_empty() && args.method.is_empty() && points.is_ok();
-        let charts = if whole { exactness::exactness(args, false, &interrupt, &mut progress) } else { Ok(()) };
+        let charts = if whole { exactness::exactness(args, false, interrupt, &mut progress) } else { Ok(()) };
         // What was measured is shown, whatever became of the rest.
         let drawn = if folder.points.all.is_empty() { Ok(()) } else { draw(args, &folder.path) };
         return points.and(charts).and(drawn);
@@ -40,13 +39,13 @@ pub fn accuracy(args: &AccuracyArgs) -> Result<(), Failure> {
     // A file that cannot be written is known before anything is computed.
     let sheet = args.sheet.as_deref().map(|path| sheet::Sheet::check(path, &args.size)).transpose()?;
     if args.counts {
-        counts::counts(args, &methods, &interrupt, &mut progress)?;
+        counts::counts(args, &methods, interrupt, &mut progress)?;
     }
     if args.exactness {
-        exactness::exactness(args, true, &interrupt, &mut progress)?;
+        exactness::exactness(args, true, interrupt, &mut progress)?;
     }
     if let Some(sheet) = sheet {
-        sheet.draw(args, &methods, &interrupt, &mut progress)?;
+        sheet.draw(args, &methods, interrupt, &mut progress)?;
     }
     Ok(())
 }

@@ -1,7 +1,8 @@
 //! `mica bench`: what every method costs with every rung of its ladder, at every scene, size and lighting.
 
+use super::BenchArgs;
 use crate::accuracy::chosen;
-use crate::args::{BenchArgs, SceneArgs};
+use crate::args::SceneArgs;
 use crate::error::{Failure, INTERRUPTED};
 use crate::interrupt::Interrupt;
 use crate::output;
@@ -19,9 +20,8 @@ const DEFAULT_SIZE: [u32; 2] = [640, 360];
 const SECONDS: f64 = 7.0;
 
 /// Measures, writes and prints. What was measured before Ctrl-C or a failure is kept.
-pub fn methods(args: &BenchArgs) -> Result<(), Failure> {
+pub fn methods(args: &BenchArgs, interrupt: &Interrupt) -> Result<(), Failure> {
     let methods = chosen(&args.method)?;
-    let interrupt = Interrupt::new()?;
     let to_stdout = args.json.as_deref() == Some(Path::new("-"));
     let lines = args.json.as_deref().filter(|_| !to_stdout).map(Lines::of_points).transpose()?;
     if let (Some(lines), Some(path)) = (&lines, &args.json)
@@ -38,7 +38,7 @@ pub fn methods(args: &BenchArgs) -> Result<(), Failure> {
         args,
         effort: Effort { seconds: SECONDS, rounds: [args.rounds.min(2), args.rounds], ..Effort::full() },
         rungs: rungs(&methods, false),
-        interrupt: &interrupt,
+        interrupt,
         progress: Progress::new(args.quiet),
         to_stdout,
         lines,
@@ -121,9 +121,9 @@ impl Bench<'_> {
         if let Some(place) = &mut open {
             let (lines, around) = (&mut self.lines, (self.interrupt, &mut self.progress));
             let keep = |point: &Point| lines.as_mut().map_or(Ok(()), |lines| lines.renew(point.clone()));
-            match sit_again(place, &mut points, &self.effort, around, keep) {
-                Err(failure) if failure.code != INTERRUPTED => self.report(&stop.scene.display().to_string(), &failure),
-                _ => {}
+            let ended = sit_again(place, &mut points, &self.effort, around, keep)?;
+            if let Some(failure) = ended.filter(|failure| failure.code != INTERRUPTED) {
+                self.report(&stop.scene.display().to_string(), &failure);
             }
         }
         self.show(&points)?;

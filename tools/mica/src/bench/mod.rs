@@ -1,5 +1,6 @@
 //! `mica bench`: how long the renderer's parts take, measured alone.
 
+mod args;
 mod body;
 mod methods;
 mod occlusion;
@@ -8,14 +9,17 @@ mod report;
 mod tables;
 mod wdh20;
 
-use crate::args::{BenchArgs, Paper};
+pub use args::BenchArgs;
+
 use crate::error::Failure;
+use crate::interrupt::Interrupt;
+use args::Paper;
 
 /// Measures what was asked for.
-pub fn bench(args: &BenchArgs) -> Result<(), Failure> {
+pub fn bench(args: &BenchArgs, interrupt: &Interrupt) -> Result<(), Failure> {
     match args.paper {
-        Some(Paper::Wdh20) => wdh20::wdh20(args),
-        None if args.occlusion => occlusion::occlusion(args),
-        None => methods::methods(args),
+        Some(Paper::Wdh20) => wdh20::wdh20(args, interrupt),
+        None if args.occlusion => occlusion::occlusion(args, interrupt),
+        None => methods::methods(args, interrupt),
     }
 }

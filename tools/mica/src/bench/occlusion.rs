@@ -1,5 +1,6 @@
 //! `mica bench --occlusion`: every body of occlusion that the device offers, side by side on the same rays.
 
+use super::BenchArgs;
 use super::body::{Body, QUESTIONS, Ready, Traced, UploadedRays, bare, upload};
 use super::rays;
 use super::report::{
@@ -7,7 +8,6 @@ use super::report::{
     StepReport,
 };
 use super::tables;
-use crate::args::BenchArgs;
 use crate::error::{Failure, INTERRUPTED};
 use crate::interrupt::Interrupt;
 use crate::output::{self, Destination};
@@ -27,12 +27,11 @@ const DEFAULT_SCENES: [&str; 2] = ["shoe", "drift"];
 const WARMUP: u32 = 1;
 
 /// Measures, writes and prints. What was measured before Ctrl-C or a failure is kept.
-pub fn occlusion(args: &BenchArgs) -> Result<(), Failure> {
+pub fn occlusion(args: &BenchArgs, interrupt: &Interrupt) -> Result<(), Failure> {
     let to_stdout = args.json.as_deref() == Some(Path::new("-"));
     let destination = args.json.as_deref().filter(|_| !to_stdout).map(Destination::check).transpose()?;
     let device = Device::new(&DeviceOptions { select: args.device.clone(), ..DeviceOptions::default() })?;
     check_counts(args, device.info())?;
-    let interrupt = Interrupt::new()?;
     let kept = cache(args.cache.as_deref(), args.no_cache);
     let mut bench = Bench {
         args,
@@ -42,7 +41,7 @@ pub fn occlusion(args: &BenchArgs) -> Result<(), Failure> {
         on_processor: device.info().kind == DeviceKind::Cpu,
         executor: executor(device.clone(), kept.as_ref(), args.memory)?,
         progress: Progress::new(args.quiet),
-        interrupt: &interrupt,
+        interrupt,
     };
     match &device.info().ray_query_lacks[..] {
         [] => bench.offered.push(OcclusionBackend::RayQuery),

@@ -1,20 +1,20 @@
 //! `mica bench --paper wdh20`: the tables and figures of Wang, Deng and Holzschuch 2020 for this implementation on this
 //! device, with the paper's own numbers beside them.
 
-use crate::args::{BenchArgs, SceneArgs};
+use super::BenchArgs;
+use crate::args::SceneArgs;
 use crate::error::{Failure, INTERRUPTED};
 use crate::interrupt::Interrupt;
 use crate::measure;
 use crate::output;
 use crate::progress::Progress;
-use crate::study::{Effort, Lighting, OpenPlace, Reference, measure as measure_point, paired, spread};
+use crate::study::{Effort, Lighting, Lines, OpenPlace, Reference, measure as measure_point, paired, spread};
 use crate::table::{Column, table};
 use mica_accuracy::{Cost, Estimate, Machine};
 use mica_gpu::Timing;
 use mica_render::{MethodInfo, Rung, method};
 use serde::Serialize;
-use std::fs::{File, OpenOptions};
-use std::io::Write;
+use serde_json::Value as Json;
 use std::path::{Path, PathBuf};
 
 /// What lines of a paper's tables say of themselves.
@@ -120,7 +120,7 @@ struct Entry<'a> {
 
 /// The numbers as they come: into a file, and into the table for people.
 struct Numbers {
-    file: Option<File>,
+    file: Option<Lines<Json>>,
     to_stdout: bool,
     rows: Vec<Vec<String>>,
 }
@@ -128,24 +128,20 @@ struct Numbers {
 impl Numbers {
     fn create(path: Option<&Path>) -> Result<Self, Failure> {
         let to_stdout = path == Some(Path::new("-"));
-        let open = |path: &Path| {
-            let file = OpenOptions::new().create(true).append(true).open(path);
-            file.map_err(|error| Failure::bad_input(format!("{}: {error}", path.display())))
-        };
-        Ok(Self { file: path.filter(|_| !to_stdout).map(open).transpose()?, to_stdout, rows: Vec::new() })
+        let file = path.filter(|_| !to_stdout).map(Lines::open).transpose()?;
+        Ok(Self { file, to_stdout, rows: Vec::new() })
     }
 
     fn add(&mut self, machine: &Machine, entry: Entry, ours: Option<Estimate>) -> Result<(), Failure> {
         let Entry { table, row, column, unit, theirs, theirs_on, note } = entry;
         let line =
             Line { schema: SCHEMA, paper: "wdh20", table, row, column, unit, ours, theirs, theirs_on, machine, note };
-        let text = serde_json::to_string(&line).map_err(|error| Failure::bad_input(error.to_string()))?;
+        let line = serde_json::to_value(&line).map_err(|error| Failure::bad_input(error.to_string()))?;
         if self.to_stdout {
-            output::print(&format!("{text}\n"))?;
+            output::print(&format!("{line}\n"))?;
         }
         if let Some(file) = &mut self.file {
-            let written = writeln!(file, "{text}").and_then(|()| file.flush());
-            written.map_err(|error| Failure::bad_input(format!("the lines cannot be written: {error}")))?;
+            file.add(line)?;
         }
         let known = ours.filter(|ours| ours.value.is_finite());
         let words = |figure: Option<f64>| figure.map_or_else(|| "-".to_owned(), |figure| format!("{figure:.3}"));
@@ -184,15 +180,14 @@ impl Numbers {
 }
 
 /// Measures, writes and prints; what was measured before Ctrl-C or a failure is kept.
-pub fn wdh20(args: &BenchArgs) -> Result<(), Failure> {
+pub fn wdh20(args: &BenchArgs, interrupt: &Interrupt) -> Result<(), Failure> {
     let size = args.size.last().copied().unwrap_or(THEIR_SIZE);
     let effort =
         &Effort { path_frames: 0, sittings: 1, rounds: [2, args.rounds.max(2)], isolated: 3, ..Effort::quick() };
     let scenes = scenes(&args.scene)?;
     let mut numbers = Numbers::create(args.json.as_deref())?;
-    let interrupt = Interrupt::new()?;
     let mut progress = Progress::new(args.quiet);
-    let mut paper = Paper { args, size, effort, interrupt: &interrupt, numbers: &mut numbers, machine: None };
+    let mut paper = Paper { args, size, effort, interrupt, numbers: &mut numbers, machine: None };
     interrupt.defer();
     let done = scenes.into_iter().try_for_each(|scene| paper.scene(scene, &mut progress));
     let machine = paper.machine.take();

@@ -86,14 +86,14 @@ impl Kept {
 
     fn load(&self, key: &str) -> Option<Vec<u8>> {
         self.cache.as_ref()?.load(key).unwrap_or_else(|error| {
-            log::warn!("{error}");
+            error.warn();
             None
         })
     }
 
     fn store(&self, key: &str, bytes: &[u8]) {
         if let Some(Err(error)) = self.cache.as_ref().map(|cache| cache.store(key, bytes)) {
-            log::warn!("{error}");
+            error.warn();
         }
     }
 }

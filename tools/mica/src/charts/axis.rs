@@ -1,4 +1,4 @@
-//! Logarithmic axes: how far they reach, and where their ticks are.
+//! Axes, most of them logarithmic: how far they reach, and where their ticks are.
 
 use super::three_digits;
 
@@ -9,6 +9,8 @@ pub struct Axis {
     pixels: [f64; 2],
     /// Where 0 is, which has no logarithm; none if no value is 0.
     zero: Option<f64>,
+    /// Whether equal lengths are equal differences.
+    linear: bool,
 }
 
 /// A line across the chart.
@@ -56,9 +58,23 @@ impl Axis {
         let range = [low, high];
         let [zero, start] = ZERO.map(|away| pixels[0] + away * (pixels[1] - pixels[0]).signum());
         Some(if has_zero {
-            Self { range, pixels: [start, pixels[1]], zero: Some(zero) }
+            Self { range, pixels: [start, pixels[1]], zero: Some(zero), linear: false }
         } else {
-            Self { range, pixels, zero: None }
+            Self { range, pixels, zero: None, linear: false }
+        })
+    }
+
+    /// The same of equal differences, which reaches somewhat beyond the values.
+    pub fn linear_around(values: impl Iterator<Item = f64>, pixels: [f64; 2]) -> Option<Self> {
+        let (least, greatest) = values
+            .filter(|value| value.is_finite())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        let margin = (MARGIN_SHARE * (greatest - least)).max(0.01 * greatest.abs()).max(LEAST);
+        (least <= greatest).then_some(Self {
+            range: [least - margin, greatest + margin],
+            pixels,
+            zero: None,
+            linear: true,
         })
     }
 
@@ -70,6 +86,9 @@ impl Axis {
     /// Where a value lies, also beyond the ends; what is not positive lies at 0, or at the lower end.
     pub fn at(&self, value: f64) -> f64 {
         let [low, high] = self.range;
+        if self.linear {
+            return self.pixels[0] + (value - low) / (high - low) * (self.pixels[1] - self.pixels[0]);
+        }
         if value <= LEAST {
             return self.zero.unwrap_or(self.pixels[0]);
         }
@@ -91,6 +110,17 @@ impl Axis {
     /// A line for every whole multiple of a power of ten, and labels on so many of them as can be read.
     pub fn ticks(&self) -> Vec<Tick> {
         let [low, high] = self.range;
+        if self.linear {
+            // Five or so, a round number apart.
+            let rough = (high - low) / 5.0;
+            let power = 10_f64.powf(rough.log10().floor());
+            let step = [1.0, 2.0, 5.0, 10.0].map(|times| times * power).into_iter().find(|step| *step >= rough);
+            let step = step.unwrap_or(rough);
+            let numbers = (low / step).ceil() as i64..=(high / step).floor() as i64;
+            let value = |number: i64| number as f64 * step;
+            let tick = |number| Tick { at: self.at(value(number)), label: Some(three_digits(value(number))) };
+            return numbers.map(tick).collect();
+        }
         let decades = low.log10().floor() as i32..=high.log10().floor() as i32;
         // Over many decades, the decades alone.
         let multiples: &[u32] = if (high / low).log10() > 7.0 { &[1] } else { &[1, 2, 3, 4, 5, 6, 7, 8, 9] };
@@ -148,6 +178,15 @@ const fn superscript(digit: char) -> char {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn linear_axes_have_round_ticks() {
+        let axis = Axis::linear_around([0.98, 1.13].into_iter(), [0.0, 100.0]).expect("an axis");
+        let labels: Vec<String> = axis.ticks().into_iter().filter_map(|tick| tick.label).collect();
+        assert_eq!(labels, ["1", "1.05", "1.1"]);
+        assert!((axis.at(1.055) - 50.0).abs() < 1e-9 && axis.holds(0.98) && !axis.holds(0.9));
+        assert_eq!(Axis::linear_around(std::iter::empty(), [0.0, 1.0]), None);
+    }
 
     fn labels(values: &[f64]) -> Vec<String> {
         let axis = Axis::around(values.iter().copied(), [0.0, 100.0]).expect("an axis");

@@ -4,10 +4,14 @@ use super::axis::Axis;
 use super::labels::{Label, place};
 use super::{Anchor, Drawing, Ink, Look, Stroke, line};
 
-/// What a chart of lines shows; both axes are logarithmic.
+/// What a chart of lines shows; the axis across is logarithmic.
 #[derive(Clone, Debug)]
 pub struct Lines {
+    /// Whether the axis upwards is of equal differences; else it is logarithmic too.
+    pub linear_up: bool,
     pub title: String,
+    /// Below the title; may be empty.
+    pub note: String,
     pub across: String,
     pub up: String,
     pub lines: Vec<Line>,
@@ -23,9 +27,11 @@ pub struct Line {
     pub points: Vec<[f64; 2]>,
 }
 
+/// Points of a line that are marked.
+const MOST_MARKS: usize = 40;
 const SIZE: [f64; 2] = [760.0, 420.0];
 const LEFT: f64 = 66.0;
-const TOP: f64 = 34.0;
+const TOP: f64 = 40.0;
 const RIGHT: f64 = 740.0;
 const BOTTOM: f64 = 368.0;
 
@@ -34,11 +40,15 @@ impl Lines {
     pub fn draw(&self) -> Drawing {
         let mut drawing = Drawing::new(SIZE, self.title.clone());
         drawing.bold([LEFT, 18.0], Anchor::Start, 13.0, Ink::Words, self.title.clone());
-        let usable = |point: &&[f64; 2]| point.iter().all(|side| *side > 1e-30 && *side < 1e30);
+        drawing.text([LEFT, 31.0], Anchor::Start, 11.0, Ink::Aside, self.note.clone());
+        let usable = |[across, up]: &&[f64; 2]| {
+            (1e-30..1e30).contains(across) && up.abs() < 1e30 && (self.linear_up || *up > 1e-30)
+        };
         let all = || self.lines.iter().flat_map(|line| &line.points).filter(usable);
         // Room at the right for the names of lines.
         let x = Axis::around(all().map(|point| point[0]), [LEFT, RIGHT - 150.0]);
-        let y = Axis::around(all().map(|point| point[1]), [BOTTOM, TOP]);
+        let around = if self.linear_up { Axis::linear_around } else { Axis::around };
+        let y = around(all().map(|point| point[1]), [BOTTOM, TOP]);
         let (Some(x), Some(y)) = (x, y) else {
             drawing.text(
                 [LEFT, TOP + 30.0],
@@ -74,7 +84,8 @@ impl Lines {
             let ink = Ink::Own(one.look.colour, 1.0);
             let stroke = if one.dashed { Stroke::dashed(ink, 1.6) } else { Stroke::solid(ink, 2.2) };
             drawing.shapes.push(line(&points, stroke));
-            for at in &points {
+            // Marks of many points would hide each other.
+            for at in points.iter().filter(|_| points.len() <= MOST_MARKS) {
                 let (fill, outline) =
                     if one.dashed { (Ink::Paper, Some(Stroke::solid(ink, 1.4))) } else { (ink, None) };
                 drawing.shapes.push(one.look.mark(*at, 4.5, Some(fill), outline));
@@ -102,7 +113,14 @@ mod tests {
     fn a_line_goes_from_left_to_right_and_leaves_out_what_is_no_number() {
         let points = vec![[4.0, 8.0], [f64::NAN, 1.0], [1.0, 2.0], [2.0, 0.0]];
         let one = Line { name: "ours".to_owned(), look: look_of_number(0), dashed: false, points };
-        let chart = Lines { title: String::new(), across: String::new(), up: String::new(), lines: vec![one] };
+        let chart = Lines {
+            linear_up: false,
+            title: String::new(),
+            note: String::new(),
+            across: String::new(),
+            up: String::new(),
+            lines: vec![one],
+        };
         let drawing = chart.draw();
         let drawn = drawing.shapes.iter().find_map(|shape| match shape {
             Shape::Line { points, stroke: Some(Stroke { ink: Ink::Own(..), .. }), .. } => Some(points),

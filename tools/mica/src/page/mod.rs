@@ -12,7 +12,7 @@ mod summary;
 
 use crate::charts::{Drawing, Use, png, svg};
 use crate::error::Failure;
-use crate::output::Destination;
+use crate::output::{self, Destination};
 use album::Album;
 use html::{in_script, slug};
 use place::Section;
@@ -68,7 +68,7 @@ pub fn write(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     put(folder.join("index.html"), page.as_bytes())?;
     if !plots.is_empty() {
         let plots = folder.join("plots");
-        std::fs::create_dir_all(&plots).map_err(|error| Failure::bad_input(format!("{}: {error}", plots.display())))?;
+        output::make_folder(&plots)?;
     }
     for Plot { file, drawing } in &plots {
         let name = folder.join("plots").join(file);

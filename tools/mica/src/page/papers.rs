@@ -105,7 +105,15 @@ fn over_pixels(group: &[&PaperLine], title: &str) -> Drawing {
         }
     }
     let unit = group.first().map(|line| line.unit.clone()).unwrap_or_default();
-    Lines { title: title.to_owned(), across: "megapixels".to_owned(), up: format!("time, {unit}"), lines }.draw()
+    Lines {
+        linear_up: false,
+        note: String::new(),
+        title: title.to_owned(),
+        across: "megapixels".to_owned(),
+        up: format!("time, {unit}"),
+        lines,
+    }
+    .draw()
 }
 
 /// `1280x720` in millions of pixels.

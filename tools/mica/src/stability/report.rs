@@ -1,5 +1,6 @@
 //! What was found of the hard cases, as JSON and for people.
 
+use super::cost::CostRow;
 use crate::report::DeviceReport;
 use crate::table::{Column, table};
 use mica_gpu::DeviceInfo;
@@ -19,6 +20,9 @@ pub struct StabilityReport {
     /// Cases that were asked for.
     asked: usize,
     pub cases: Vec<CaseReport>,
+    /// What stable forms cost in whole frames; empty where nobody asked.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub cost: Vec<CostRow>,
 }
 
 impl StabilityReport {
@@ -31,6 +35,7 @@ impl StabilityReport {
             held: cases.iter().filter(|case| case.holds).count(),
             asked,
             cases,
+            cost: Vec::new(),
         }
     }
 }

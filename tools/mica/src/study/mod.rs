@@ -25,4 +25,4 @@ pub use run::study;
 pub use sittings::sit_again;
 pub use store::{Folder, Lines};
 pub use tables::of_place as table_of;
-pub use timing::{paired, spread};
+pub use timing::{Clock, paired, spread};

@@ -169,11 +169,12 @@ impl Run<'_> {
             shown.push(point);
         }
         let (folder, around) = (&mut *self.folder, (self.interrupt, &mut *self.progress));
-        sit_again(&mut open, shown, self.effort, around, |point| folder.points.renew(point.clone())).map_err(
-            |failure| {
-                if failure.code == INTERRUPTED { Stopped::For(failure) } else { Stopped::Place(failure) }
-            },
-        )?;
+        let keep = |point: &Point| folder.points.renew(point.clone());
+        match sit_again(&mut open, shown, self.effort, around, keep).map_err(Stopped::For)? {
+            Some(failure) if failure.code == INTERRUPTED => return Err(Stopped::For(failure)),
+            Some(failure) => return Err(Stopped::Place(failure)),
+            None => {}
+        }
         self.executor = Some(open.session.into_executor());
         Ok(())
     }

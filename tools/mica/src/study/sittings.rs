@@ -51,17 +51,17 @@ impl Drift {
 }
 
 /// Times all points of a place again, in turns, until each has as many sittings as it should, and hands over those whose
-/// figures change. An interrupt or a failure ends it; what was timed until then counts.
+/// figures change. An interrupt or a failure of a frame ends it and is returned; what was timed until then counts.
 ///
 /// # Errors
-/// Those of frames, with the point they are of; one with the code of an interrupt; and those of `keep`.
+/// Those of `keep`: nothing more can be kept.
 pub fn sit_again(
     open: &mut OpenPlace,
     points: &mut [Point],
     effort: &Effort,
     (interrupt, progress): (&Interrupt, &mut Progress),
     mut keep: impl FnMut(&Point) -> Result<(), Failure>,
-) -> Result<(), Failure> {
+) -> Result<Option<Failure>, Failure> {
     let before: Vec<Cost> = points.iter().map(|point| point.cost.clone()).collect();
     let mut end = Ok(());
     for sitting in 1..effort.sittings {
@@ -76,7 +76,7 @@ pub fn sit_again(
             keep(point)?;
         }
     }
-    end
+    Ok(end.err())
 }
 
 fn sitting_of<'a>(

@@ -3,7 +3,7 @@
 use super::place::OpenPlace;
 use super::{Effort, Reference, ReferencePixels, reference_file};
 use crate::error::Failure;
-use crate::output::Destination;
+use crate::output::{self, Destination};
 use mica_accuracy::{POINT_SCHEMA, Place, Point, REFERENCE_SCHEMA, ReferenceLine};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -56,12 +56,17 @@ impl<T: Serialize + DeserializeOwned> Lines<T> {
     /// # Errors
     /// If the file cannot be read and written, or another process has it.
     pub fn open(path: &Path) -> Result<Self, Failure> {
+        output::check_name(path)?;
         let failed = |error: std::io::Error| {
             let what_to_do = "name a file that can be written, in a folder that is there";
             Failure::bad_input(format!("{}: {error}; {what_to_do}", path.display()))
         };
         let mut file =
             OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
+        // A device or a pipe has no lines to go on from, and may have no end.
+        if !file.metadata().map_err(failed)?.is_file() {
+            return Err(Failure::bad_input(format!("{}: is no file that lines can be added to", path.display())));
+        }
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
@@ -100,16 +105,18 @@ impl<T: Serialize + DeserializeOwned> Lines<T> {
         Ok(Self { path: path.to_owned(), file, all, passed_over })
     }
 
-    /// Appends a line, which is on its way to the disk before this returns.
+    /// Appends a line, which is on the disk before this returns.
     pub fn add(&mut self, line: T) -> Result<(), Failure> {
         let failed = |error: String| Failure::bad_input(format!("{} cannot be written: {error}", self.path.display()));
         let mut text = serde_json::to_string(&line).map_err(|error| failed(error.to_string()))?;
         text.push('\n');
+        let end = self.file.stream_position().map_err(|error| failed(error.to_string()))?;
         // In one call, so that what a kill cuts off is the end of this line and nothing else.
-        self.file
-            .write_all(text.as_bytes())
-            .and_then(|()| self.file.flush())
-            .map_err(|error| failed(error.to_string()))?;
+        if let Err(error) = self.file.write_all(text.as_bytes()).and_then(|()| self.file.sync_data()) {
+            // What a full disk took of it is taken off; where that fails too, it is when the file is next opened.
+            let _ = self.file.set_len(end).and_then(|()| self.file.seek(SeekFrom::Start(end)));
+            return Err(failed(error.to_string()));
+        }
         self.all.push(line);
         Ok(())
     }
@@ -129,8 +136,7 @@ impl Folder {
     /// Opens or makes it, for this process alone.
     pub fn open(path: &Path) -> Result<Self, Failure> {
         for folder in [path.to_owned(), path.join("pictures"), path.join("references")] {
-            fs::create_dir_all(&folder)
-                .map_err(|error| Failure::bad_input(format!("{}: {error}; name a folder", folder.display())))?;
+            output::make_folder(&folder)?;
         }
         // The points' lock is the folder's.
         let points = Lines::of_points(&path.join("points.jsonl"))?;

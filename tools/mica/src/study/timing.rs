@@ -53,7 +53,11 @@ impl Clock {
         }
     }
 
-    fn ns(self, run: &Run) -> Result<f64, Failure> {
+    /// Nanoseconds of a frame.
+    ///
+    /// # Errors
+    /// If the device gave none.
+    pub fn ns(self, run: &Run) -> Result<f64, Failure> {
         let ns = match self {
             Self::Gpu => run.frame_ns,
             Self::Cpu => run.cpu_ns,

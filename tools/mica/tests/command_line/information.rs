@@ -103,6 +103,25 @@ fn the_doctor_finds_a_machine_that_renders() {
     assert_eq!(text.contains("VK_DRIVER_FILES=$(ci/drivers)"), alone, "{text}");
 }
 
+#[test]
+fn the_doctor_asks_what_arithmetic_does() {
+    let report = json(&succeeded(run(&["doctor", "--canaries", "--json"])));
+    let canaries = report["canaries"].as_array().expect("a list");
+    let text = succeeded(run(&["doctor", "--canaries"]));
+    for canary in canaries {
+        let [name, question, found, means] =
+            ["name", "question", "found", "means"].map(|key| canary[key].as_str().expect("a text"));
+        assert!(![name, question, found, means].contains(&""), "{canary}");
+        assert!(text.contains(&format!("\ncanary {name}: {question}\n  {found}\n  {means}\n")), "{text}");
+    }
+    let names: Vec<&str> = canaries.iter().filter_map(|canary| canary["name"].as_str()).collect();
+    for name in ["loop_limit", "contraction", "fma", "nan_selection", "denormals", "half_floats", "precision_log"] {
+        assert!(names.contains(&name), "{names:?}");
+    }
+    let unasked = json(&succeeded(run(&["doctor", "--json"])));
+    assert!(unasked.get("canaries").is_none() && !succeeded(run(&["doctor"])).contains("canary"), "{unasked}");
+}
+
 /// Runs the program where no driver can be found.
 fn without_a_driver(arguments: &[&str]) -> Output {
     let mut command = mica();

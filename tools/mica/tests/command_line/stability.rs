@@ -29,3 +29,25 @@ fn what_is_no_case_is_refused_in_one_line() {
         assert!(error.contains("H01 to H44"), "{error}");
     }
 }
+
+#[test]
+fn sweeps_are_drawn_and_say_what_holds() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let made = in_folder(folder.path(), "made/sweeps");
+    let text = succeeded(run(&["stability", "--sweeps", &made]));
+    assert_eq!(text.lines().filter(|line| line.ends_with(", holds")).count(), 8, "{text}");
+    let lines = std::fs::read_to_string(folder.path().join("made/sweeps/sweeps.jsonl")).expect("lines");
+    for line in lines.lines().map(json) {
+        let name = line["name"].as_str().expect("a name");
+        let svg = std::fs::read_to_string(folder.path().join(format!("made/sweeps/{name}.svg"))).expect("a chart");
+        for series in line["series"].as_array().expect("a list") {
+            // As XML has apostrophes.
+            let words = series["name"].as_str().expect("a name").replace('\'', "&#39;");
+            assert!(svg.contains(&words), "{name}: {words}");
+            assert!(series["points"].as_array().is_some_and(|points| points.len() > 10), "{name}: {words}");
+        }
+        image::open(folder.path().join(format!("made/sweeps/{name}.png"))).expect("a picture");
+    }
+    let error = failed_in_one_line(&run(&["stability", "H07", "--sweeps", &made]), 2);
+    assert!(error.contains("--sweeps"), "{error}");
+}

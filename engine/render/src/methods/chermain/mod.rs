@@ -58,6 +58,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
               space; lobes .04 alpha wide, whatever gamma is.",
     claim: Claim::Mean,
     mean_between: [0.95, 1.05],
+    repeats: false,
     settings: &[
         Setting {
             key: "microfacet_relative_area",

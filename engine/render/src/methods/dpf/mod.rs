@@ -100,7 +100,7 @@ pub(super) fn precompute(
     let update = |why: String, ns: u64| Update { pass: "dpf".to_owned(), why, ns };
     let kept = cache.and_then(|cache| {
         cache.load(&key).unwrap_or_else(|error| {
-            log::warn!("{error}");
+            error.warn();
             None
         })
     });
@@ -130,7 +130,7 @@ pub(super) fn precompute(
         let download = g.download(&made);
         let mut run = executor.run(g, Timing::Overlapped)?;
         if let Err(error) = cache.store(&key, &run.take(download)) {
-            log::warn!("{error}");
+            error.warn();
         }
     }
     Ok((made, update(why, ns)))

@@ -49,6 +49,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
               distribution is that claimed with epsilon=0; the paper's .1 keeps the mean and loses variance.",
     claim: Claim::Distribution,
     mean_between: [0.99, 1.01],
+    repeats: true,
     settings: &[
         Setting {
             key: "epsilon",

@@ -5,7 +5,8 @@
 //! - 64 directions drawn from the BRDF stand for the whole environment: a sun in the map is missed by most of them, and
 //!   hardly lights (give it to the scene as a light);
 //! - Eq. 17 makes P-hat a solid angle that does not know the light: a white furnace sparkles;
-//! - the 36 x 9 directions of Eq. 17 miss narrow lobes (alpha .02 seen head-on): no flake tested one by one is lit there;
+//! - the 36 x 9 directions of Eq. 17 miss narrow lobes (alpha .02 seen head-on): no flake tested one by one is lit there
+//!   (`p_hat=closed` repairs it);
 //! - one lambda a flake: lit sets are nested, flakes with a small lambda never go out;
 //! - the scales switch at 4 and 64 flakes in the footprint: the variance jumps there;
 //! - the table is linear in alpha between eight roughnesses from .02, below which it stays at .02, and sums whole
@@ -42,6 +43,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "A prefiltered 4D table of the environment and a quadtree of flake counts, looked up at three scales.",
     claim: Claim::Look,
     mean_between: [0.6, 1.7],
+    repeats: true,
     settings: &[
         Setting {
             key: "dpf",
@@ -99,6 +101,13 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             kind: Kind::Flag,
             default: Value::Flag(false),
             meaning: "Multiplies point and directional light by the cosine that Eq. 21 leaves out.",
+        },
+        Setting {
+            key: "p_hat",
+            unit: "",
+            kind: Kind::Choice(&["printed", "closed"]),
+            default: Value::Word("printed"),
+            meaning: "Eq. 17 by the paper's 36 x 9 directions, which miss narrow lobes, or in closed form.",
         },
         Setting {
             key: "blur",

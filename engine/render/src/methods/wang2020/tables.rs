@@ -7,12 +7,14 @@ use crate::methods::dpf::{Accumulated, AccumulatedKey, DpfSource};
 use crate::settings::Value;
 use mica_graph::{Buffer, Extent, Graph, Lifetime};
 use mica_shaders::{constants as c, prefilter, prefilter_probability, quadtree};
+use std::f64::consts::PI;
 
 const PREFILTER_ENTRIES: u64 =
     (c::PREFILTER_THETA_N * c::PREFILTER_PHI_N * c::PREFILTER_THETA_O * c::PREFILTER_PHI_O) as u64;
 
-/// What a prefiltered table depends on, beside the accumulated one: samples. The environment is a renderer's own and does not change.
-type PrefilteredKey = (AccumulatedKey, f64);
+/// What a prefiltered table depends on, beside the accumulated one: samples, and whether P-hat is in closed form. The
+/// environment is a renderer's own and does not change.
+type PrefilteredKey = (AccumulatedKey, f64, bool);
 /// What a quadtree depends on: flakes, seed, depth.
 type QuadtreeKey = (u64, f64, f64);
 
@@ -57,7 +59,8 @@ impl Tables {
         environment: &EnvironmentTables,
     ) {
         let accumulated = self.accumulated.update(g, material, alpha(material), (source, &ALPHAS, dpf));
-        let prefiltered = (accumulated, material.values.number("samples"));
+        let closed = material.values.word("p_hat") == "closed";
+        let prefiltered = (accumulated, material.values.number("samples"), closed);
         if environment.present() && self.prefiltered_for != Some(prefiltered) {
             self.prefilter(g, material, prefiltered, environment);
         }
@@ -74,17 +77,23 @@ impl Tables {
         key: PrefilteredKey,
         environment: &EnvironmentTables,
     ) {
-        let (accumulated, samples) = key;
+        let (accumulated, samples, closed) = key;
         let change = match self.prefiltered_for {
-            Some((before, _)) if before != accumulated => "P(i, o, gamma) changed",
-            Some(_) => "the number of samples changed",
+            Some((before, ..)) if before != accumulated => "P(i, o, gamma) changed",
+            Some((_, before, _)) if before != samples => "the number of samples changed",
+            Some(_) => "P-hat changed",
             None => "first frame under this environment",
         };
         g.because(format!("material {}: {change}", material.name));
         let directions = c::PREFILTER_THETA_O * c::PREFILTER_PHI_O;
         let mut probability = g.buffer("prefilter_probability", u64::from(directions) * 4);
         let bind = prefilter_probability::Bind { accumulated: &self.accumulated.table, probability: &mut probability };
-        g.pass(bind, (), Extent::line(directions));
+        let params = prefilter_probability::Params {
+            alpha: accumulated.0 as f32,
+            sin2_half_gamma: (material.solid_angle() / (4.0 * PI)) as f32,
+            closed: u32::from(closed),
+        };
+        g.pass(bind, params, Extent::line(directions));
         let params = prefilter::Params { alpha: accumulated.0 as f32, samples: samples as u32 };
         let bind = prefilter::Bind {
             environment: environment.map(),

@@ -2,15 +2,17 @@
 //! anything is allocated (glTF 2.0, sections 3.6.1 and 3.6.2).
 
 use super::limits::Budget;
-use crate::scene::{SceneError, SceneErrorCode};
+use crate::scene::{SceneError, SceneErrorCode, memory};
 use ::gltf::json::accessor::sparse::Sparse;
 use ::gltf::json::accessor::{Accessor, ComponentType, GenericComponentType, IndexComponentType, Type};
 use ::gltf::json::buffer::View;
 use ::gltf::json::validation::Checked::{Invalid, Valid};
 use ::gltf::json::{Index, Root};
 
-/// How many elements one accessor may have; without a buffer view its length costs its author nothing.
+/// How many elements one accessor may have.
 const MAX_ELEMENTS: u64 = 1 << 28;
+/// How many without a buffer view, where they cost its author nothing.
+const MAX_ZEROS: u64 = 1 << 24;
 
 const DAMAGED: &str = "the file is damaged or its exporter is at fault: export it again";
 
@@ -134,8 +136,9 @@ impl<'a> Reader<'a> {
             Invalid => return Err(wrong_format(location, format!("a type that does not exist; {kinds:?} would do"))),
         };
         let count = accessor.count.0;
-        if count > MAX_ELEMENTS {
-            let what = format!("{count} elements where {MAX_ELEMENTS} are allowed");
+        let most = if accessor.buffer_view.is_some() { MAX_ELEMENTS } else { MAX_ZEROS };
+        if count > most {
+            let what = format!("{count} elements where {most} are allowed");
             return Err(SceneError::new(SceneErrorCode::AccessorTooLong, location, what, "split the mesh"));
         }
         let Valid(GenericComponentType(component)) = accessor.component_type else {
@@ -218,8 +221,12 @@ impl<'a> Reader<'a> {
 impl Sound<'_> {
     fn read<T: Copy>(&self, zero: T, decode: impl Fn(&[u8]) -> T, location: &str) -> Result<Vec<T>, SceneError> {
         let mut values: Vec<T> = match self.dense {
-            Some(dense) => dense.iter().map(&decode).collect(),
-            None => vec![zero; self.count],
+            Some(dense) => {
+                let mut values = memory::with_room(self.count, location)?;
+                values.extend(dense.iter().map(&decode));
+                values
+            }
+            None => memory::filled(zero, self.count, location)?,
         };
         if let Some((places, component, replacements)) = &self.sparse {
             for (place, replacement) in places.iter().zip(replacements.iter()) {

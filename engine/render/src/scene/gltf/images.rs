@@ -3,12 +3,12 @@
 use super::accessor::{Reader, named};
 use super::limits::LoadLimits;
 use super::source::Source;
-use crate::scene::{Encoding, SceneError, SceneErrorCode, Texture, Wrap};
+use crate::scene::{Encoding, SceneError, SceneErrorCode, Texture, Wrap, memory};
 use ::gltf::json;
 use ::gltf::json::texture::{MagFilter, Sampler, WrappingMode};
 use ::gltf::json::validation::Checked;
 use ::gltf::json::{Index, Root};
-use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
+use image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Cursor;
@@ -16,6 +16,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What the crate gives for the source of a texture that has none, as those in other formats.
 const NO_IMAGE: usize = u32::MAX as usize;
+
+/// No byte of a PNG becomes more texels than this: eight of one bit each in a byte, 1032 times what deflate made of that.
+/// JPEG has 64 texels in a bit at most.
+const MOST_TEXELS_PER_BYTE: u64 = 8 * 1032;
 
 /// The distinct uses of images, in the order in which materials name them.
 pub struct TextureUses<'a> {
@@ -78,11 +82,13 @@ impl<'a> TextureUses<'a> {
         let textures = self.uses.iter().map(|wanted| {
             let image = &decoded[&wanted.image];
             reader.budget.claim(image.rgba.len() as u64, &image.location)?;
+            let mut pixels = memory::with_room(image.rgba.len(), &image.location)?;
+            pixels.extend_from_slice(&image.rgba);
             Ok(Texture {
                 name: image.name.clone(),
                 width: image.width,
                 height: image.height,
-                pixels: image.rgba.clone(),
+                pixels,
                 encoding: wanted.encoding,
                 wrap: wanted.wrap,
                 nearest: wanted.nearest,
@@ -132,9 +138,8 @@ fn load(document: &Root, index: usize, reader: &Reader, source: &Source) -> Resu
     let uri_name = || object.uri.clone().filter(|uri| !uri.starts_with("data:"));
     let name = object.name.clone().or_else(uri_name).unwrap_or_else(|| location.clone());
     let claim = |bytes: u64| reader.budget.claim(bytes, &location);
-    let image = decode(bytes, source.limits, claim, &location)?;
-    let (width, height) = (image.width(), image.height());
-    Ok(Decoded { name, location, width, height, rgba: image.into_rgba8().into_raw() })
+    let (width, height, rgba) = decode(bytes, source.limits, claim, &location)?;
+    Ok(Decoded { name, location, width, height, rgba })
 }
 
 /// Decodes a PNG or JPEG whose size is within limits; `claim` is asked before memory is taken.
@@ -143,7 +148,7 @@ fn decode(
     limits: &LoadLimits,
     claim: impl Fn(u64) -> Result<(), SceneError>,
     location: &str,
-) -> Result<DynamicImage, SceneError> {
+) -> Result<(u32, u32, Vec<u8>), SceneError> {
     let invalid = |what: String| {
         SceneError::new(SceneErrorCode::InvalidImage, location, what, "save the image again, as PNG or JPEG")
     };
@@ -169,13 +174,56 @@ fn decode(
         reader.limits(bounds);
         let decoder = reader.into_decoder().map_err(failed)?;
         let (width, height) = decoder.dimensions();
-        let rgba_bytes = u64::from(width) * u64::from(height) * 4;
-        if rgba_bytes > limits.image_bytes {
+        let texels = u64::from(width) * u64::from(height);
+        if texels == 0 {
+            return Err(invalid("has no texels".to_owned()));
+        }
+        if texels * 4 > limits.image_bytes {
             return Err(too_large(format!("{width} x {height} texels, more than {} bytes", limits.image_bytes)));
         }
-        claim(rgba_bytes)?;
-        DynamicImage::from_decoder(decoder).map_err(failed)
+        if texels > MOST_TEXELS_PER_BYTE.saturating_mul(bytes.len() as u64) {
+            return Err(invalid(format!("{width} x {height} texels, which {} bytes cannot hold", bytes.len())));
+        }
+        claim(texels * 4)?;
+        let color = decoder.color_type();
+        let mut rgba = memory::with_room(texels as usize * 4, location)?;
+        let mut decoded = memory::filled(0, decoder.total_bytes() as usize, location)?;
+        decoder.read_image(&mut decoded).map_err(failed)?;
+        if !append_rgba8(&decoded, color, &mut rgba) {
+            return Err(invalid(format!("texels of an unread kind, {color:?}")));
+        }
+        Ok((width, height, rgba))
     }));
-    let image = caught.unwrap_or_else(|_| Err(invalid("its decoder gave up on it".to_owned())))?;
-    if image.width() == 0 || image.height() == 0 { Err(invalid("has no texels".to_owned())) } else { Ok(image) }
+    caught.unwrap_or_else(|_| Err(invalid("its decoder gave up on it".to_owned())))
+}
+
+/// Converts what a PNG or JPEG holds; false for kinds that neither has.
+fn append_rgba8(decoded: &[u8], color: ColorType, rgba: &mut Vec<u8>) -> bool {
+    let eight = |bytes: &[u8]| bytes[0];
+    // 65535 is 257 times 255.
+    let sixteen = |bytes: &[u8]| ((u32::from(u16::from_ne_bytes([bytes[0], bytes[1]])) + 128) / 257) as u8;
+    match color {
+        ColorType::L8 => append(decoded, 1, eight, |c: [u8; 1]| [c[0], c[0], c[0], 255], rgba),
+        ColorType::La8 => append(decoded, 1, eight, |c: [u8; 2]| [c[0], c[0], c[0], c[1]], rgba),
+        ColorType::Rgb8 => append(decoded, 1, eight, |c: [u8; 3]| [c[0], c[1], c[2], 255], rgba),
+        ColorType::Rgba8 => rgba.extend_from_slice(decoded),
+        ColorType::L16 => append(decoded, 2, sixteen, |c: [u8; 1]| [c[0], c[0], c[0], 255], rgba),
+        ColorType::La16 => append(decoded, 2, sixteen, |c: [u8; 2]| [c[0], c[0], c[0], c[1]], rgba),
+        ColorType::Rgb16 => append(decoded, 2, sixteen, |c: [u8; 3]| [c[0], c[1], c[2], 255], rgba),
+        ColorType::Rgba16 => append(decoded, 2, sixteen, |c: [u8; 4]| c, rgba),
+        _ => return false,
+    }
+    true
+}
+
+/// Texels of `N` channels of `bytes` bytes each.
+fn append<const N: usize>(
+    decoded: &[u8],
+    bytes: usize,
+    channel: impl Fn(&[u8]) -> u8,
+    texel: impl Fn([u8; N]) -> [u8; 4],
+    rgba: &mut Vec<u8>,
+) {
+    let texels = decoded.chunks_exact(N * bytes);
+    rgba.extend(texels.flat_map(|source| texel(std::array::from_fn(|k| channel(&source[k * bytes..])))));
 }

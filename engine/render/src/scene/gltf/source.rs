@@ -1,7 +1,7 @@
 //! Where bytes come from: files beside the scene, data URIs, and nothing else.
 
 use super::limits::LoadLimits;
-use crate::scene::{SceneError, SceneErrorCode};
+use crate::scene::{SceneError, SceneErrorCode, memory};
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use std::fs::{self, File};
@@ -130,7 +130,7 @@ pub fn read_regular_file(path: &Path, limit_bytes: u64, location: &str) -> Resul
         return Err(too_large(metadata.len()));
     }
     // It may grow while it is read.
-    let mut bytes = Vec::with_capacity(metadata.len() as usize);
+    let mut bytes = memory::with_room(metadata.len() as usize + 1, location)?;
     File::open(path).and_then(|file| file.take(limit_bytes + 1).read_to_end(&mut bytes)).map_err(unreadable)?;
     if bytes.len() as u64 > limit_bytes { Err(too_large(bytes.len() as u64)) } else { Ok(bytes) }
 }

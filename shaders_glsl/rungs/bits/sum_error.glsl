@@ -1,0 +1,6 @@
+// A sum and what its rounding lost.
+#include "shared/exact_sum.glsl"
+
+uvec4 answer(uvec4 a, uvec4 b) {
+  return uvec4(floatBitsToUint(exact_sum(uintBitsToFloat(a.x), uintBitsToFloat(a.y))), 0u, 0u);
+}

@@ -1,0 +1,6 @@
+//! `mica_fuzz::png` under libFuzzer.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    mica_fuzz::png(bytes);
+});
