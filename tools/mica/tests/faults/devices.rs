@@ -203,7 +203,7 @@ fn f25_a_bench_that_loses_the_device_keeps_what_was_measured() {
     let all = lines(&whole).len();
     // The later the loss, the more is kept, and less than all of it.
     let mut kept = Vec::new();
-    for submission in [0, 12, 24, 48] {
+    for submission in [0, 12, 24, 48, 96, 192, 384] {
         let faults = format!("vkQueueSubmit2@{submission}={DEVICE_LOST}");
         let output = place.under(&faults, &[&bench[..], &["sphere"]].concat());
         if output.status.success() {

@@ -51,9 +51,15 @@ fn in_folder(folder: &Path, name: &str) -> String {
     folder.join(name).to_str().expect("temporary folders have plain names").to_owned()
 }
 
-/// The program, on a disk where no file may grow beyond so many bytes.
+/// The program, on a disk where no file may grow beyond so many bytes. Newer lavapipes keep device memory in files, which such
+/// a limit ends too: outputs are the same on any driver, so Debian's own serves where it is installed.
 fn mica_on_full_disk(most_bytes: u64) -> Command {
-    through(&["prlimit", &format!("--fsize={most_bytes}")])
+    const DEBIANS: &str = "/usr/share/vulkan/icd.d/lvp_icd.x86_64.json";
+    let mut command = through(&["prlimit", &format!("--fsize={most_bytes}")]);
+    if Path::new(DEBIANS).exists() {
+        command.env("VK_DRIVER_FILES", DEBIANS);
+    }
+    command
 }
 
 /// The program, started by another one.
@@ -370,19 +376,21 @@ fn f39_a_cache_that_cannot_be_used_is_one_warning_and_a_run_without() {
     };
     let (without, silence) = picture("without.exr", mica(), &["--no-cache"]);
     assert_eq!(silence, "");
+    // Another driver may round otherwise.
+    let without_limit = picture("without.exr", mica_on_full_disk(1 << 40), &["--no-cache"]).0;
     let closed = folder.path().join("closed");
     fs::create_dir(&closed).expect("a folder");
     read_only(&closed);
     let full = in_folder(folder.path(), "full");
     fs::write(folder.path().join("file"), "x").expect("a file");
-    for (program, cache, part) in [
-        (mica(), in_folder(folder.path(), "file/cache"), "file/cache"),
-        (mica_bound_by_permissions(&closed), in_folder(&closed, "cache"), "Permission denied"),
+    for (program, expected, cache, part) in [
+        (mica(), &without, in_folder(folder.path(), "file/cache"), "file/cache"),
+        (mica_bound_by_permissions(&closed), &without, in_folder(&closed, "cache"), "Permission denied"),
         // Room for the picture, and not for the tables.
-        (mica_on_full_disk(100_000), full.clone(), "File too large"),
+        (mica_on_full_disk(100_000), &without_limit, full.clone(), "File too large"),
     ] {
         let (bytes, warning) = picture("a.exr", program, &["--cache", &cache]);
-        assert!(bytes == without, "{cache}");
+        assert!(bytes == *expected, "{cache}");
         assert_eq!(warning.lines().count(), 1, "{warning}");
         assert!(warning.starts_with("warning: ") && warning.contains(part), "{warning}");
         assert!(warning.contains("goes on without it"), "{warning}");
