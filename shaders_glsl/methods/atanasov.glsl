@@ -69,12 +69,12 @@ void test_flakes(FlakeNode node, uvec2 key) {
       vec3 normal = flake_normal(key, flake, slope_deviation);
       float weight = length(normal);
       vec3 m = normal / weight;
-      for (uint light = 0u; light < frame.light_count; ++light) {
+      for (uint light = 0u; light < light_count(); ++light) {
         --steps_left;
         bool hit = reflects_into_cone(m, o, directions[light], sin2_half_gamma) && dot(directions[light], m) > 0.0;
         lit[light] += hit ? weight : 0.0;
       }
-      if (frame.has_environment == 1u) {
+      if (has_environment()) {
         uint word = hash(flake, key.x, hash(key.y, frame.sample_index));
         reflected += reflected_by(m, weight, vec2(unit_from(word), unit_from(mixed(word))));
       }
@@ -93,8 +93,8 @@ void count_flakes(FlakeNode node, uvec2 key) {
     undrawn += share * count;
     return;
   }
-  float steps = float(frame.light_count);
-  for (uint light = 0u; light < frame.light_count; ++light) {
+  float steps = float(light_count());
+  for (uint light = 0u; light < light_count(); ++light) {
     if (probabilities[light] > 0.0) {
       float probability = share * probabilities[light];
       steps += binomial_steps(count, probability);
@@ -114,8 +114,8 @@ void visit(FlakeNode node) {
 }
 
 // What a flake reflects of the environment on average over all normals, by a few of them.
-vec3 reflected_on_average() {
-  uint word = hash(gl_GlobalInvocationID.x, gl_GlobalInvocationID.y, frame.sample_index);
+vec3 reflected_on_average(uvec2 pixel) {
+  uint word = hash(pixel.x, pixel.y, frame.sample_index);
   vec4 shift = vec4(unit_from(word), unit_from(mixed(word)), unit_from(mixed(~word)), unit_from(hash(word, 1u)));
   vec3 sum = vec3(0.0);
   for (uint index = 0u; index < samples; ++index) {
@@ -137,16 +137,16 @@ vec3 glint_radiance(GlintSurface surface) {
   float smooth_share = !(expected >= 1e-18 * flakes)
     ? 1.0
     : clamp((expected - blend_from) / max(blend_to - blend_from, 1e-3), 0.0, 1.0);
-  float steps = steps_to(covered, leaf_level) + expected * float(1u + frame.light_count);
+  float steps = steps_to(covered, leaf_level) + expected * float(1u + light_count());
   uint end = leaf_level;
   if (!(expected <= enumerated_below && steps <= ENUMERATING_STEPS)) {
-    float of_lights = min(LIGHTS_AT_FULL_DEPTH / float(max(frame.light_count, 1u)), 1.0);
+    float of_lights = min(LIGHTS_AT_FULL_DEPTH / float(max(light_count(), 1u)), 1.0);
     end = level_within(covered, leaf_level, COUNTING_STEPS * of_lights);
   }
   enumerated = end == leaf_level && steps <= ENUMERATING_STEPS;
   bool macro = !(steps_to(covered, 0u) <= COUNTING_STEPS);
 
-  for (uint light = 0u; light < frame.light_count; ++light) {
+  for (uint light = 0u; light < light_count(); ++light) {
     vec3 i = arrival_at(lights[light], surface.position).direction * scene_from_local;
     bool reaches = (surface.shadowed >> light & 1u) == 0u && i.z > 0.0;
     directions[light] = reaches ? i : vec3(0.0);
@@ -167,7 +167,7 @@ vec3 glint_radiance(GlintSurface surface) {
   // Over a N.
   float per_flake = smooth_share < 1.0 ? 1.0 / expected : 0.0;
   vec3 radiance = vec3(0.0);
-  for (uint light = 0u; light < frame.light_count; ++light) {
+  for (uint light = 0u; light < light_count(); ++light) {
     vec3 i = directions[light];
     if (i.z > 0.0) {
       float i_h = half_vector_cosine(i, o);
@@ -185,8 +185,8 @@ vec3 glint_radiance(GlintSurface surface) {
       radiance += irradiance * schlick(f0, i_h) * (i_h * shadowing * share / (4.0 * PI * sin2_half_gamma));
     }
   }
-  if (frame.has_environment == 1u) {
-    vec3 average = reflected_on_average();
+  if (has_environment()) {
+    vec3 average = reflected_on_average(surface.pixel);
     vec3 sum = (reflected + counted * average) * per_flake;
     radiance += frame.environment.z * mix(sum, average, smooth_share);
   }

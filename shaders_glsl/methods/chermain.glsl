@@ -175,7 +175,7 @@ vec3 glint_radiance(GlintSurface surface) {
   vec3 o = surface.o;
   float o_n = dot(o, n);
   vec3 radiance = smooth_environment(surface, alpha);
-  for (uint index = 0u; index < frame.light_count; ++index) {
+  for (uint index = 0u; index < light_count(); ++index) {
     if ((surface.shadowed >> index & 1u) == 0u) {
       Arrival arrival = arrival_at(lights[index], surface.position);
       vec3 i = arrival.direction;

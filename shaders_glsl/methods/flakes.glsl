@@ -69,17 +69,17 @@ vec3 expected_radiance(GlintSurface surface, mat3 to_local, double sin2_half_gam
   float solid_angle = 4.0 * PI * float(sin2_half_gamma);
   vec3 n = surface.normal;
   vec3 radiance = vec3(0.0);
-  for (uint index = 0u; index < frame.has_environment * EXPECTED_NORMALS; ++index) {
+  for (uint index = 0u; index < (has_environment() ? EXPECTED_NORMALS : 0u); ++index) {
     vec3 m = sample_beckmann(hammersley(index, EXPECTED_NORMALS), alpha);
     radiance += mirrored_environment(surface, m, to_local, 0u) / (m.z * float(EXPECTED_NORMALS));
   }
   // The scene's lights and then the environment's small ones, which few normals would find or miss by chance.
-  for (uint index = 0u; index < frame.light_count + small_light_count; ++index) {
-    bool of_environment = index >= frame.light_count;
+  for (uint index = 0u; index < light_count() + small_light_count; ++index) {
+    bool of_environment = index >= light_count();
     if (of_environment || (surface.shadowed >> index & 1u) == 0u) {
       Arrival arrival;
       if (of_environment) {
-        SmallLight light = small_lights[index - frame.light_count];
+        SmallLight light = small_lights[index - light_count()];
         arrival = Arrival(scene_from_environment(light.direction), frame.environment.z * light.irradiance, 1e30);
       } else {
         arrival = arrival_at(lights[index], surface.position);
@@ -98,7 +98,7 @@ vec3 expected_radiance(GlintSurface surface, mat3 to_local, double sin2_half_gam
 }
 
 vec3 glint_radiance(GlintSurface surface) {
-  uint at = gl_GlobalInvocationID.y * frame.width + gl_GlobalInvocationID.x;
+  uint at = surface.pixel.y * frame.width + surface.pixel.x;
   Walker walker = walkers[at];
   vec3 radiance = vec3(walker.radiance[0], walker.radiance[1], walker.radiance[2]);
   mat3 from_local = frame_about(surface.normal);
@@ -108,7 +108,7 @@ vec3 glint_radiance(GlintSurface surface) {
   vec2 side_y = surface.uv_dy;
   float area = footprint_area(side_x, side_y);
   FlakeSet set = FlakeSet(leaf_level, table_level, seed);
-  bool lit_by_environment = frame.has_environment != 0u;
+  bool lit_by_environment = has_environment();
   bool begins = walker.state == WALK_AHEAD;
   bool finished = walker.state == WALK_OVER;
   bool expects = false;
@@ -116,7 +116,7 @@ vec3 glint_radiance(GlintSurface surface) {
   // Loops that run once or never: drivers that run pixels as lanes of one thread execute what is in a branch for all of
   // them, but leave a loop when the last has.
   for (bool once = begins; once; once = false) {
-    float tests = float(frame.light_count) + (lit_by_environment ? 1.0 : 0.0);
+    float tests = float(light_count()) + (lit_by_environment ? 1.0 : 0.0);
     float steps_expected = flake_walk_steps(set, side_x, side_y, flakes, tests);
     // Written so that a footprint that is no number shows what is expected, too.
     expects = !(steps_expected <= most_steps) || area < 1e-30;
@@ -127,7 +127,7 @@ vec3 glint_radiance(GlintSurface surface) {
     vec3 each[MAX_LIGHTS];
     uint reaching = 0u;
     float over_flakes = 1.0 / (flakes * 4.0 * PI * float(sin2_half_gamma));
-    for (uint index = 0u; index < frame.light_count; ++index) {
+    for (uint index = 0u; index < light_count(); ++index) {
       Arrival arrival = arrival_at(lights[index], surface.position);
       if ((surface.shadowed >> index & 1u) == 0u && dot(arrival.direction, surface.normal) > 0.0) {
         towards[reaching] = arrival.direction * from_local;

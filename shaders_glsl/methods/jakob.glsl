@@ -30,8 +30,7 @@ layout(push_constant) uniform Params {
 
 // A direction from which the environment is asked: a normal of twice the roughness reflects o, and the flakes' cone blurs
 // that. `density` is exact: the chance that the reflection is within the cone about i, over the cone.
-vec3 environment_sample(uint index, vec3 o, out float density) {
-  uvec2 pixel = gl_GlobalInvocationID.xy;
+vec3 environment_sample(uvec2 pixel, uint index, vec3 o, out float density) {
   uint name = hash(pixel.x, pixel.y, hash(frame.sample_index, index));
   vec4 random = vec4(unit_from(name), unit_from(mixed(name + 1u)), unit_from(mixed(name + 2u)), unit_from(mixed(name + 3u)));
   vec3 h = sample_beckmann(random.xy, 2.0 * alpha);
@@ -52,8 +51,8 @@ vec3 glint_radiance(GlintSurface surface) {
   JakobTree tree = JakobTree(flakes, seed, last_level, split_ratio, epsilon);
   float all = max(float(flakes), 1.0);
 
-  uint directions = frame.has_environment == 1u ? samples : 0u;
-  uint queries = product + directions + frame.light_count;
+  uint directions = has_environment() ? samples : 0u;
+  uint queries = product + directions + light_count();
   float share_of_places = 1.0;
   vec3 radiance = vec3(0.0);
   for (uint query = 0u; query < queries; ++query) {
@@ -62,7 +61,7 @@ vec3 glint_radiance(GlintSurface surface) {
     vec3 strength = vec3(places ? 1.0 : 0.0); // Irradiance of a facing surface, or radiance over its density.
     if (!places && query < product + directions) {
       float density;
-      i = environment_sample(query - product, o, density);
+      i = environment_sample(surface.pixel, query - product, o, density);
       if (density > 1e-12) {
         vec3 towards = environment_from_scene(to_local * i);
         strength = frame.environment.z * environment_radiance(towards, 0.0) / (density * float(samples));

@@ -115,13 +115,13 @@ vec3 glint_radiance(GlintSurface surface) {
 
   // What a source adds if every flake is lit.
   vec3 each[MAX_SOURCES];
-  uint drawn = frame.has_environment == 1u ? min(samples, MAX_SAMPLES) : 0u;
-  sources = frame.light_count + drawn;
-  uint word = hash(gl_GlobalInvocationID.x, gl_GlobalInvocationID.y, frame.sample_index);
+  uint drawn = has_environment() ? min(samples, MAX_SAMPLES) : 0u;
+  sources = light_count() + drawn;
+  uint word = hash(surface.pixel.x, surface.pixel.y, frame.sample_index);
   vec4 shift = vec4(unit_from(word), unit_from(mixed(word)), unit_from(mixed(~word)), unit_from(hash(word, 1u)));
   float solid_angle = 4.0 * PI * sin2_half_gamma;
   for (uint source = 0u; source < sources; ++source) {
-    bool is_light = source < frame.light_count;
+    bool is_light = source < light_count();
     vec3 i;
     vec3 radiance;
     if (is_light) {
@@ -130,7 +130,7 @@ vec3 glint_radiance(GlintSurface surface) {
       radiance = (surface.shadowed >> source & 1u) == 0u ? arrival.irradiance / solid_angle : vec3(0.0);
     } else {
       // Where a random flake reflects to: by density P / sigma, so that the table's error cancels.
-      vec2 u = hammersley(source - frame.light_count, drawn);
+      vec2 u = hammersley(source - light_count(), drawn);
       vec3 m = sample_beckmann(fract(u + shift.xy), alpha);
       float o_m = dot(o, m);
       i = direction_in_cone(2.0 * o_m * m - o, sin2_half_gamma, fract(u.yx * vec2(7.0, 13.0) + shift.zw));

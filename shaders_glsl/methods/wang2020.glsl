@@ -172,8 +172,8 @@ vec3 glint_radiance(GlintSurface surface) {
   vec3 radiance = vec3(0.0);
   float all_flakes = expected;
   bool gathered = false;
-  uint sources = 1u + frame.light_count;
-  for (uint source = frame.has_environment == 1u ? 0u : 1u; source < sources; ++source) {
+  uint sources = 1u + light_count();
+  for (uint source = has_environment() ? 0u : 1u; source < sources; ++source) {
     float probability = 0.0;
     vec3 each = vec3(0.0);
     if (source == 0u) {

@@ -4,7 +4,7 @@
 
 #include "shared/bvh_layout.glsl"
 #include "shared/rays.glsl"
-#ifdef ALPHA_MASKS
+#ifdef MASKED
 #include "shared/alpha_mask.glsl"
 #endif
 
@@ -145,7 +145,7 @@ bool bvh_walk(vec3 origin, vec3 direction, float t_min, float t_max, bool any_wi
       if (triangle < triangles_end) {
         RayHit met = hit;
         bool blocks = bvh_meets(ray, bvh_triangles[triangle], t_min, t_max, met);
-#ifdef ALPHA_MASKS
+#ifdef MASKED
         // A loop, as some drivers execute branches always.
         for (bool asks = blocks; asks; asks = false) {
           blocks = is_covered(instance - 1u, met.triangle, met.barycentrics);

@@ -1,3 +1,3 @@
 // As bvh.glsl, in scenes where alpha masks cut holes into triangles.
-#define ALPHA_MASKS
+#define MASKED
 #include "occlusion/bvh.glsl"

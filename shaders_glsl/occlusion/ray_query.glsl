@@ -4,7 +4,7 @@
 #extension GL_EXT_ray_query : require
 
 #include "shared/rays.glsl"
-#ifdef ALPHA_MASKS
+#ifdef MASKED
 #include "shared/alpha_mask.glsl"
 const uint RAY_FLAGS = gl_RayFlagsNoneEXT;
 #else
@@ -17,7 +17,7 @@ layout(binding = 20) uniform accelerationStructureEXT scene_structure; // Its cu
 void ray_query_run(rayQueryEXT query, uint flags, vec3 origin, vec3 direction, float t_min, float t_max) {
   rayQueryInitializeEXT(query, scene_structure, flags, 0xffu, origin, t_min, direction, t_max);
   while (rayQueryProceedEXT(query)) {
-#ifdef ALPHA_MASKS
+#ifdef MASKED
     uint instance = rayQueryGetIntersectionInstanceCustomIndexEXT(query, false);
     uint triangle = rayQueryGetIntersectionPrimitiveIndexEXT(query, false);
     if (is_covered(instance, triangle, rayQueryGetIntersectionBarycentricsEXT(query, false))) {

@@ -1,3 +1,3 @@
 // As ray_query.glsl, in scenes where alpha masks cut holes into triangles.
-#define ALPHA_MASKS
+#define MASKED
 #include "occlusion/ray_query.glsl"

@@ -56,7 +56,7 @@ void main() {
   ivec2 at = ivec2(pixel);
   Seen seen = seen_at(pixel);
   vec3 ray = normalize(camera_ray(pixel));
-  bool lit_by_environment = frame.has_environment == 1u;
+  bool lit_by_environment = has_environment();
   float scale = frame.environment.z;
   if (seen.instance == 0u) {
     vec3 sky = lit_by_environment ? scale * environment_radiance(environment_from_scene(ray), 0.0) : vec3(0.0);
@@ -81,37 +81,50 @@ void main() {
     float ambient = emission_occlusion.w;
     vec3 up = environment_from_scene(n);
     vec3 mirrored = environment_from_scene(reflect(ray, n));
-    vec3 gathered = textureLod(sampler2D(irradiance, linear_wrap_u), equirect_from(up), 0.0).rgb;
-    vec2 factors = lobe_albedo(albedo, clamp(o_n, 0.0, 1.0), lobe.alpha);
-    vec3 reflected = f0_weight.w * (lobe.f0 * factors.x + factors.y);
-    below += scale * ambient * (1.0 - greatest(reflected)) * diffuse_roughness.rgb * gathered;
-    if (f0_weight.w > 0.0) {
+    vec3 reflected = vec3(0.0);
+    if (SMOOTH_SPECULAR) {
+      vec2 factors = lobe_albedo(albedo, clamp(o_n, 0.0, 1.0), lobe.alpha);
+      reflected = f0_weight.w * (lobe.f0 * factors.x + factors.y);
+    }
+    if (DIFFUSE) {
+      vec3 gathered = textureLod(sampler2D(irradiance, linear_wrap_u), equirect_from(up), 0.0).rgb;
+      below += scale * ambient * (1.0 - greatest(reflected)) * diffuse_roughness.rgb * gathered;
+    }
+    if (SMOOTH_SPECULAR && f0_weight.w > 0.0) {
       below += scale * ambient * reflected * prefiltered_radiance(prefiltered, mirrored, lobe.alpha);
     }
-    if (coat_weight > 0.0) {
+    if (CLEAR_COAT && coat_weight > 0.0) {
       above += scale * ambient * lobe_under_environment(coat, n, o, mirrored);
     }
   }
-  uint shadowed = frame.light_count > 0u ? texelFetch(shadow_mask, at, 0).x : 0u;
-  for (uint index = 0u; index < frame.light_count; ++index) {
+  uint shadowed = SHADOWS && light_count() > 0u ? texelFetch(shadow_mask, at, 0).x : 0u;
+  for (uint index = 0u; index < light_count(); ++index) {
     if ((shadowed >> index & 1u) == 0u) {
       Arrival arrival = arrival_at(lights[index], seen.position);
       float i_n = dot(arrival.direction, n);
       if (i_n > 0.0) {
         vec3 arriving = arrival.irradiance * i_n;
-        float mirrors = f0_weight.w * greatest(schlick(lobe.f0, half_vector_cosine(arrival.direction, o)));
-        below += arriving * (1.0 - mirrors) * diffuse_roughness.rgb / PI;
-        if (f0_weight.w > 0.0) {
+        float mirrors = 0.0;
+        if (SMOOTH_SPECULAR) {
+          mirrors = f0_weight.w * greatest(schlick(lobe.f0, half_vector_cosine(arrival.direction, o)));
+        }
+        if (DIFFUSE) {
+          below += arriving * (1.0 - mirrors) * diffuse_roughness.rgb / PI;
+        }
+        if (SMOOTH_SPECULAR && f0_weight.w > 0.0) {
           below += arriving * f0_weight.w * lobe_under_light(lobe, n, arrival.direction, o);
         }
-        if (coat_weight > 0.0) {
+        if (CLEAR_COAT && coat_weight > 0.0) {
           above += arriving * lobe_under_light(coat, n, arrival.direction, o);
         }
       }
     }
   }
-  // Light passes the coat on its way in and out; the weight of what lies below follows glTF's layering.
-  float coat_fresnel = coat_weight * schlick(vec3(COAT_F0), clamp(o_n, 0.0, 1.0)).x;
-  vec3 color = emission_occlusion.rgb * (1.0 - coat_fresnel) + below * (1.0 - coat_fresnel) + coat_weight * above;
+  vec3 color = emission_occlusion.rgb + below;
+  if (CLEAR_COAT) {
+    // Light passes the coat on its way in and out; the weight of what lies below follows glTF's layering.
+    float coat_fresnel = coat_weight * schlick(vec3(COAT_F0), clamp(o_n, 0.0, 1.0)).x;
+    color = emission_occlusion.rgb * (1.0 - coat_fresnel) + below * (1.0 - coat_fresnel) + coat_weight * above;
+  }
   imageStore(radiance, at, vec4(color, 1.0));
 }

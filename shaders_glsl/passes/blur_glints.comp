@@ -3,6 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "shared/frame.glsl"
 #include "shared/blur.glsl"
+#include "shared/tile_lists.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 30) uniform texture2D source;
@@ -10,12 +11,13 @@ layout(binding = 40, rgba32f) uniform writeonly image2D blurred_image;
 layout(push_constant) uniform Params {
   ivec2 axis; // (1, 0) or (0, 1).
   int radius; // Taps on each side of the centre.
+  uint list; // Of the tiles that are blurred.
   float weights[5]; // Of the centre and of the taps on each side.
 };
 
 void main() {
-  uvec2 pixel = gl_GlobalInvocationID.xy;
-  if (outside_frame(pixel)) {
+  uvec2 pixel;
+  if (!listed_pixel(list, pixel)) {
     return;
   }
   ivec2 at = ivec2(pixel);

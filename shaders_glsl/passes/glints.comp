@@ -2,14 +2,15 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/glint_surface.glsl"
+#include "shared/tile_lists.glsl"
 #include "method.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 40, rgba32f) uniform writeonly image2D glints;
 
 void main() {
-  uvec2 pixel = gl_GlobalInvocationID.xy;
-  if (outside_frame(pixel)) {
+  uvec2 pixel;
+  if (!listed_pixel(materials[material].glint_list - 1u, pixel)) {
     return;
   }
   Seen seen = seen_at(pixel);

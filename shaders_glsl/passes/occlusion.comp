@@ -7,14 +7,18 @@
 #include "shared/ray_counts.glsl"
 #include "shared/ray_offset.glsl"
 #include "shared/scene.glsl"
+#include "shared/tile_lists.glsl"
 #include "occlusion.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 40, r32f) uniform writeonly image2D visibility; // 1 free, 0 occluded; 1 where nothing glints.
+layout(push_constant) uniform Params {
+  uint list; // Of the tiles that show the layer.
+};
 
 void main() {
-  uvec2 pixel = gl_GlobalInvocationID.xy;
-  if (!outside_frame(pixel)) {
+  uvec2 pixel;
+  if (listed_pixel(list, pixel)) {
     Seen seen = seen_at(pixel);
     bool asks = seen.instance != 0u;
     asks = asks && (materials[instances[seen.instance - 1u].material].flags & MATERIAL_GLINTS) != 0u;

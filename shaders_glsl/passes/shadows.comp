@@ -22,14 +22,14 @@ void main() {
       reach = triangle_reach(instances[seen.instance - 1u], seen.triangle);
     }
     vec3 origin = offset_origin(seen.position, seen.geometric_normal, reach);
-    for (uint index = 0u; index < (seen.instance != 0u ? frame.light_count : 0u); ++index) {
+    for (uint index = 0u; index < (seen.instance != 0u ? light_count() : 0u); ++index) {
       Light light = lights[index];
       Arrival arrival = arrival_at(light, seen.position);
       // Behind the surface, out of range and outside of a cone is dark without asking.
       bool dark = dot(arrival.direction, seen.geometric_normal) <= 0.0 || arrival.irradiance == vec3(0.0);
       vec3 towards = arrival.direction;
       float t_max = 1e30;
-      if (light.kind != LIGHT_DIRECTIONAL) {
+      if (!DIRECTIONAL_LIGHTS || light.kind != LIGHT_DIRECTIONAL) {
         // Ends before the light by as much as it would start off a surface there: what a lamp lies on does not hide it, and
         // a shade close to a far lamp does.
         towards = offset_origin(light.position, -arrival.direction, reach) - origin;

@@ -97,7 +97,7 @@ void main() {
   vec4 sampled[TEXTURE_SLOTS] = vec4[](
     vec4(1.0), vec4(1.0), vec4(0.5, 0.5, 1.0, 1.0), vec4(1.0), vec4(1.0), vec4(1.0), vec4(1.0), vec4(1.0), vec4(1.0)
   );
-  for (uint index = 0u; index < material.texture_count; ++index) {
+  for (uint index = 0u; index < (TEXTURES ? material.texture_count : 0u); ++index) {
     TextureUse use_of = material.textures[index];
     bool second = (use_of.slot_and_set & 1u) != 0u;
     sampled[use_of.slot_and_set >> 1] = sample_texture(
@@ -117,7 +117,7 @@ void main() {
   );
   float squared = dot(shading, shading);
   shading = squared > 1e-30 ? shading * inversesqrt(squared) : (back ? -geometric : geometric);
-  if ((material.flags & MATERIAL_NORMAL_MAP) != 0u && (instance.flags & INSTANCE_HAS_TANGENTS) != 0u) {
+  if (NORMAL_MAPS && (material.flags & MATERIAL_NORMAL_MAP) != 0u && (instance.flags & INSTANCE_HAS_TANGENTS) != 0u) {
     vec4 t0 = tangents[corners.x];
     vec4 t1 = tangents[corners.y];
     vec4 t2 = tangents[corners.z];
@@ -135,7 +135,7 @@ void main() {
   }
 
   vec4 base_color = material.base_color * sampled[TEXTURE_BASE_COLOR];
-  if ((instance.flags & INSTANCE_HAS_COLORS) != 0u) {
+  if (VERTEX_COLORS && (instance.flags & INSTANCE_HAS_COLORS) != 0u) {
     vec4 tint = barycentric.x * colors[corners.x] + barycentric.y * colors[corners.y] + barycentric.z * colors[corners.z];
     base_color *= clamp(tint, 0.0, 1.0);
   }
@@ -151,7 +151,7 @@ void main() {
     scattered = vec3(0.0);
     weight = 0.0;
   }
-  if ((material.flags & MATERIAL_GLINTS) != 0u) {
+  if (GLINTS && (material.flags & MATERIAL_GLINTS) != 0u) {
     f0 = material.glint_color.rgb;
     weight = 0.0;
   }
@@ -163,15 +163,18 @@ void main() {
   vec2 octahedral = octahedral_from(geometric);
   imageStore(position, at, vec4(point, octahedral.x));
   imageStore(normal, at, vec4(shading, octahedral.y));
-  vec2 flakes_at = texture_place(
-    uv_scale * (second_set ? uv0.zw : uv0.xy),
-    uv_scale * (second_set ? uv1.zw : uv1.xy),
-    uv_scale * (second_set ? uv2.zw : uv2.xy),
-    weights,
-    (material.flags & MATERIAL_GLINT_REPEATS) != 0u
-  );
+  vec2 flakes_at = vec2(0.0);
+  if (GLINTS) {
+    flakes_at = texture_place(
+      uv_scale * (second_set ? uv0.zw : uv0.xy),
+      uv_scale * (second_set ? uv1.zw : uv1.xy),
+      uv_scale * (second_set ? uv2.zw : uv2.xy),
+      weights,
+      (material.flags & MATERIAL_GLINT_REPEATS) != 0u
+    );
+    imageStore(footprint, at, uv_scale * vec4(second_set ? uv_dx.zw : uv_dx.xy, second_set ? uv_dy.zw : uv_dy.xy));
+  }
   imageStore(uv, at, vec4(flakes_at, coat));
-  imageStore(footprint, at, uv_scale * vec4(second_set ? uv_dx.zw : uv_dx.xy, second_set ? uv_dy.zw : uv_dy.xy));
   imageStore(diffuse, at, vec4(scattered, clamp(roughness, 0.0, 1.0)));
   imageStore(specular, at, vec4(f0, weight));
   imageStore(emission, at, vec4(emitted, ambient));

@@ -1,6 +1,7 @@
 // Where a triangle is surface and where its material cuts a hole into it, for rays and for the camera alike.
 #ifndef ALPHA_MASK_GLSL
 #define ALPHA_MASK_GLSL
+#include "shared/effects.glsl"
 #include "shared/materials.glsl"
 
 // The alpha of a texture within a triangle: at texture coordinates `corner` and a change from there. The finest level,
@@ -18,13 +19,13 @@ bool is_covered(uint instance_index, uint triangle, vec2 barycentrics) {
   Instance instance = instances[instance_index];
   bool covered = true;
   // Loops, as some drivers execute branches always, and few triangles have holes.
-  uint masks = (materials[instance.material].flags & MATERIAL_ALPHA_MASK) != 0u ? 1u : 0u;
+  uint masks = ALPHA_MASKS && (materials[instance.material].flags & MATERIAL_ALPHA_MASK) != 0u ? 1u : 0u;
   for (uint mask = 0u; mask < masks; ++mask) {
     uvec3 vertices = triangle_vertices(instance, triangle);
     // Rounding may leave the triangle by a hair, and another tile of its texture begin there.
     vec2 weights = clamp(barycentrics, 0.0, 1.0);
     float alpha = materials[instance.material].base_color.a;
-    if ((instance.flags & INSTANCE_HAS_COLORS) != 0u) {
+    if (VERTEX_COLORS && (instance.flags & INSTANCE_HAS_COLORS) != 0u) {
       // What is the same at all corners stays so to the bit: a cutoff of 1 keeps what is opaque.
       float corner = colors[vertices.x].a;
       float tint = corner + weights.x * (colors[vertices.y].a - corner) + weights.y * (colors[vertices.z].a - corner);
@@ -32,7 +33,7 @@ bool is_covered(uint instance_index, uint triangle, vec2 barycentrics) {
     }
     // The base colour is the first of the textures, if it is there.
     TextureUse use_of = materials[instance.material].textures[0];
-    bool textured = materials[instance.material].texture_count > 0u && use_of.slot_and_set >> 1 == TEXTURE_BASE_COLOR;
+    bool textured = TEXTURES && materials[instance.material].texture_count > 0u && use_of.slot_and_set >> 1 == TEXTURE_BASE_COLOR;
     for (uint once = 0u; once < (textured ? 1u : 0u); ++once) {
       vec4 corner = vec4(0.0);
       vec4 change = vec4(0.0);

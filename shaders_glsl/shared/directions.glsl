@@ -16,8 +16,8 @@ mat3 frame_about(vec3 normal) {
 
 // The same with its first column along the tangent's part across the unit normal, its second turned from there by the
 // handedness, 1 or -1. A tangent along the normal, or none, gives way to frame_about: what is across of it is rounding.
-// Orthonormal to 4e-7 on lavapipe, to 1e-6 where normalize is no better than Vulkan's promise: one subtraction leaves as much of the normal as rounding is of what is across, two leave none (Giraud et
-// al. 2005, "twice is enough").
+// Orthonormal to 4e-7 on lavapipe, to 1e-6 where normalize is no better than Vulkan's promise: one subtraction leaves as
+// much of the normal as rounding is of what is across, two leave none (Giraud et al. 2005, "twice is enough").
 mat3 frame_along(vec3 normal, vec3 tangent, float handedness) {
   float size = max(max(abs(tangent.x), abs(tangent.y)), abs(tangent.z));
   vec3 scaled = tangent / size;

@@ -13,6 +13,7 @@
 #define FLAKES_IN_FOOTPRINT_GLSL
 #include "shared/flake_set.glsl"
 #include "shared/footprint_area.glsl"
+#include "shared/lit_flake.glsl"
 
 layout(std430, binding = 55) readonly buffer FlakeCounts { uvec2 flake_counts[]; }; // Low and high word, row by row.
 
@@ -241,16 +242,6 @@ bool flake_is_inside(FlakeWalk walk, LeafCross leaf_x, LeafCross leaf_y, uint fl
   precise double x = place.x * walk.across_x.y - place.y * walk.across_x.x;
   precise double y = place.x * walk.across_y.y - place.y * walk.across_y.x;
   return between(leaf_x, x) && between(leaf_y, y);
-}
-
-// Whether a flake of this normal, of any length, reflects i into the cone about o: |2 (i.m) m - i - o|^2 is at most
-// 4 sin^2(gamma/2) for the unit normal m, and i.m > 0.
-bool flake_is_lit(vec3 normal, vec3 i, vec3 o, double sin2_half_gamma) {
-  dvec3 m = dvec3(normal);
-  double i_m = dot(dvec3(i), m);
-  double square = dot(m, m);
-  dvec3 chord = 2.0lf * i_m * m - square * (dvec3(i) + dvec3(o));
-  return i_m > 0.0lf && dot(chord, chord) <= 4.0lf * sin2_half_gamma * (square * square);
 }
 
 // More steps than a walk takes, but for six standard deviations of the number of flakes, which a texture that repeats in

@@ -1,6 +1,7 @@
 // The camera and the frame. Scene space is world space about the scene's centre.
 #ifndef FRAME_GLSL
 #define FRAME_GLSL
+#include "shared/effects.glsl"
 
 layout(std140, binding = 0) uniform Frame {
   mat4 clip_from_scene; // Reversed depth: 1 at the near plane, 0 at infinity.
@@ -21,6 +22,16 @@ layout(std140, binding = 0) uniform Frame {
 vec3 camera_ray(uvec2 pixel) {
   vec2 center = vec2(pixel) + 0.5;
   return frame.ray_corner.xyz + center.x * frame.ray_dx.xyz + center.y * frame.ray_dy.xyz;
+}
+
+// Lights in the scene, where there are any.
+uint light_count() {
+  return LIGHTS ? frame.light_count : 0u;
+}
+
+// Whether there is an environment.
+bool has_environment() {
+  return ENVIRONMENT && frame.has_environment == 1u;
 }
 
 bool outside_frame(uvec2 pixel) {

@@ -12,6 +12,7 @@ layout(binding = 32) uniform texture2D specular;
 layout(binding = 33) uniform utexture2D shadow_mask;
 
 struct GlintSurface {
+  uvec2 pixel; // Column and row.
   vec3 position; // In scene space.
   vec3 normal; // Shading normal.
   vec3 o; // Unit, towards the viewer.
@@ -25,6 +26,7 @@ struct GlintSurface {
 GlintSurface glint_surface(uvec2 pixel, Seen seen) {
   ivec2 at = ivec2(pixel);
   GlintSurface surface;
+  surface.pixel = pixel;
   surface.position = seen.position;
   surface.normal = seen.normal;
   surface.o = -normalize(camera_ray(pixel));
@@ -33,7 +35,7 @@ GlintSurface glint_surface(uvec2 pixel, Seen seen) {
   surface.uv_dx = sides.xy;
   surface.uv_dy = sides.zw;
   surface.f0 = texelFetch(specular, at, 0).rgb;
-  surface.shadowed = frame.light_count > 0u ? texelFetch(shadow_mask, at, 0).x : 0u;
+  surface.shadowed = SHADOWS && light_count() > 0u ? texelFetch(shadow_mask, at, 0).x : 0u;
   return surface;
 }
 

@@ -2,6 +2,7 @@
 #ifndef LIGHTS_GLSL
 #define LIGHTS_GLSL
 #include "shared/constants.glsl"
+#include "shared/effects.glsl"
 
 struct Light {
   vec3 position; // In scene space; unused by directional lights.
@@ -24,7 +25,7 @@ struct Arrival {
 };
 
 Arrival arrival_at(Light light, vec3 position) {
-  if (light.kind == LIGHT_DIRECTIONAL) {
+  if (DIRECTIONAL_LIGHTS && light.kind == LIGHT_DIRECTIONAL) {
     return Arrival(-light.direction, light.color, 1e30);
   }
   vec3 to_light = light.position - position;
@@ -37,7 +38,7 @@ Arrival arrival_at(Light light, vec3 position) {
     float relative = squared / (light.range * light.range);
     fall_off = clamp(1.0 - relative * relative, 0.0, 1.0);
   }
-  if (light.kind == LIGHT_SPOT) {
+  if (SPOT_LIGHTS && light.kind == LIGHT_SPOT) {
     float cosine = dot(-direction, light.direction);
     float inside = clamp((cosine - light.cos_outer) / max(light.cos_inner - light.cos_outer, 1e-3), 0.0, 1.0);
     fall_off *= inside * inside;

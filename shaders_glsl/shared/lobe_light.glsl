@@ -15,7 +15,7 @@ float glint_density(GlintSurface surface, vec3 i, vec3 h);
 
 // Radiance that a smooth Beckmann lobe of this roughness reflects of the environment.
 vec3 smooth_environment(GlintSurface surface, float alpha) {
-  if (frame.has_environment == 0u) {
+  if (!has_environment()) {
     return vec3(0.0);
   }
   vec3 n = surface.normal;
@@ -29,7 +29,7 @@ vec3 lobe_under_lights(GlintSurface surface, float alpha) {
   vec3 n = surface.normal;
   vec3 o = surface.o;
   vec3 radiance = vec3(0.0);
-  for (uint index = 0u; index < frame.light_count; ++index) {
+  for (uint index = 0u; index < light_count(); ++index) {
     if ((surface.shadowed >> index & 1u) == 0u) {
       Arrival arrival = arrival_at(lights[index], surface.position);
       vec3 i = arrival.direction;

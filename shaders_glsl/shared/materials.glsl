@@ -21,7 +21,7 @@ struct Material {
   uint flags; // MATERIAL_*.
   uint texture_count; // How many textures it has.
   uint glint_uv_set; // Which set of texture coordinates the flakes lie in.
-  uint reserved;
+  uint glint_list; // Its list of tiles plus 1; 0 where it does not glint.
   TextureUse textures[9]; // In the order of their slots.
 };
 

@@ -33,4 +33,9 @@ float naive_determinant(float a, float b, float c, float d) {
   return a * d - b * c;
 }
 
+// The slope beyond which nothing counts, from the normal alone.
+float naive_slope_reach(float alpha) {
+  return 5.0 * alpha;
+}
+
 #endif

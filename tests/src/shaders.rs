@@ -69,6 +69,7 @@ pub fn test_shader(
         bindings: accesses.iter().map(binding).collect::<Vec<_>>().leak(),
         params_bytes,
         outputs: &[],
+        effects: mica_graph::Effects::NONE,
     }))
 }
 

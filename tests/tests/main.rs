@@ -9,6 +9,7 @@ mod claims;
 mod contact_shadows;
 mod deliot_belcour;
 mod displayed;
+mod effects;
 mod environment_flakes;
 mod environment_lobes;
 mod exactness;

@@ -1,6 +1,6 @@
 //! What a budget of time or a wanted error chooses among measured points.
 
-use crate::{Cost, Estimate, Metric, Point, front};
+use crate::{Cost, Metric, Point, Weight, front};
 
 /// What a choice is to reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,9 +52,9 @@ pub enum NothingFits {
 
 /// What reaches a goal among the points of one place on one machine.
 ///
-/// A time is [`Cost::glint_ns`], an error the value of its estimate: what happens as often as not, not the worst case.
-/// The spread and the interval are in the points, for whoever wants more than that. Points without a time or an error,
-/// and those that another beats in both ([`front`]), are never chosen nor named as a step.
+/// A time is [`Cost::glint_ns`], an error that of [`Weight::of_error`]: what happens as often as not, and where noise hides
+/// that, the most that it can be. Spread and interval are in the points, for whoever wants more than that. Points
+/// without a time or an error, and those that another beats in both ([`front`]), are never chosen nor named as a step.
 ///
 /// Who embeds the renderer measures on the devices of interest, ships the `points.jsonl` that this writes, and chooses
 /// when the device is known:
@@ -79,7 +79,10 @@ pub enum NothingFits {
 /// # Errors
 /// If no point reaches the goal; the error says what comes nearest.
 pub fn choose(points: &[Point], metric: Metric, goal: Goal) -> Result<Choice<'_>, NothingFits> {
-    let error = |point: &Point| point.errors.as_ref().and_then(|errors| metric.of(errors)).map_or(f64::NAN, value);
+    let error = |point: &Point| {
+        let known = point.errors.as_ref().and_then(|errors| metric.of(errors));
+        known.map_or(f64::NAN, |error| Weight::of_error(error).value)
+    };
     let weighed: Vec<(f64, f64)> = points.iter().map(|point| (point.cost.glint_ns(), error(point))).collect();
     let steps = front(&weighed);
     // Along the front times rise and errors fall.
@@ -94,10 +97,6 @@ pub fn choose(points: &[Point], metric: Metric, goal: Goal) -> Result<Choice<'_>
         next_better: step(chosen.checked_add(1)),
         next_cheaper: step(chosen.checked_sub(1)),
     })
-}
-
-fn value(estimate: Estimate) -> f64 {
-    estimate.value
 }
 
 /// Why no step reaches the goal.
@@ -119,18 +118,16 @@ fn nearest(points: &[Point], metric: Metric, goal: Goal, weighed: &[(f64, f64)],
 }
 
 impl Cost {
-    /// What the glints of a frame take in nanoseconds, by which costs are compared: the median. Where the spread reaches
-    /// down to 0, all that is known is that they take no longer than its upper end, which then stands for them.
+    /// What the glints of a frame take in nanoseconds, by which costs are compared ([`Weight::of_time`]).
     pub fn glint_ns(&self) -> f64 {
-        let Estimate { value, low, high } = self.glints;
-        if low <= 0.0 { high.max(value) } else { value }
+        Weight::of_time(self.glints).value
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Errors, Machine, POINT_SCHEMA, Place};
+    use crate::{Errors, Estimate, Machine, POINT_SCHEMA, Place};
     use rand_pcg::Pcg64;
     use rand_pcg::rand_core::Rng;
 
@@ -266,14 +263,22 @@ mod tests {
     }
 
     #[test]
-    fn a_time_that_noise_hides_counts_as_its_upper_end() {
-        let hidden = |value, low, high| point("a", Estimate { value, low, high }, None).cost.glint_ns();
-        assert_eq!(hidden(5.0, 1.0, 9.0), 5.0);
-        assert_eq!(hidden(-2.0, -3.0, 4.0), 4.0);
-        assert_eq!(hidden(2.0, 0.0, 4.0), 4.0);
-        assert_eq!(hidden(-2.0, f64::NAN, f64::NAN), -2.0);
-        let points = [point("a", Estimate { value: -MS, low: -2.0 * MS, high: MS }, Some(errors(0.5, 1.0)))];
-        assert!(choose(&points, Metric::W1, Goal::Budget { ns: 0.9 * MS }).is_err(), "less than nothing is no bargain");
+    fn what_noise_hides_counts_as_its_upper_end() {
+        let hidden = Estimate { value: -MS, low: -2.0 * MS, high: MS };
+        let points = [point("a", hidden, Some(errors(0.5, 1.0)))];
+        let of = |points: &[Point], goal| choose(points, Metric::W1, goal).is_ok();
+        assert!(!of(&points, Goal::Budget { ns: 0.9 * MS }), "less than nothing is no bargain");
+        assert!(of(&points, Goal::Budget { ns: MS }));
+        let w1 = Estimate { value: 0.01, low: 0.0, high: 0.03 };
+        let points = [point("a", hidden, Some(Errors { w1, ..errors(0.0, 1.0) }))];
+        assert!(!of(&points, Goal::TargetError(0.02)) && of(&points, Goal::TargetError(0.03)));
+        // Of two that noise hides, neither is the cheaper because its spread happens to end before 0.
+        let of_ends = |name, [low, value, high]: [f64; 3], w1| {
+            point(name, Estimate { value, low, high }.scaled(MS), Some(errors(w1, 1.0)))
+        };
+        let points = [of_ends("a", [-2.0, 5.9, 13.9], 0.1), of_ends("b", [0.4, 8.5, 16.7], 0.2)];
+        let best = choose(&points, Metric::W1, Goal::TargetError(1.0)).map(|choice| choice.chosen.name());
+        assert_eq!(best, Ok("a".to_owned()));
     }
 
     #[test]

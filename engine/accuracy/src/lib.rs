@@ -15,6 +15,7 @@ mod reference;
 mod sparkle;
 mod stage;
 mod tiles;
+mod weight;
 
 pub use choice::{Choice, Goal, NothingFits, choose};
 pub use counts::{CountErrors, CountLaw};
@@ -28,3 +29,4 @@ pub use point::{
 };
 pub use reference::MeanOfTwo;
 pub use stage::{Condition, Stage, StageError};
+pub use weight::Weight;

@@ -3,14 +3,14 @@
 use crate::borrow::{HostBuffer, HostImage};
 use crate::device::Device;
 use crate::error::Error;
-use crate::pipeline::Pipelines;
+use crate::pipeline::{Pipelines, PipelinesMade};
 use crate::prepare::{Command, MARKER_BYTES, prepare};
 use crate::record::{Recording, timestamp_count};
 use crate::resources::{Brought, MemoryRow, Resources};
 use crate::run::{Recorded, Run};
 use crate::slot::{Slot, Staging};
 use crate::submit::Submission;
-use crate::timing::{PassTime, Timing, elapsed_ns};
+use crate::timing::{PassTime, Timing, believed_ns, elapsed_ns};
 use ash::vk;
 use mica_graph::{Buffer, Description, Download, Graph, Image, Lifetime, Plan, Requirements, ResourceId, Work};
 use std::cell::RefCell;
@@ -18,7 +18,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How an executor behaves.
 #[derive(Clone, Debug)]
@@ -169,12 +169,14 @@ impl Executor {
     /// `recorded` is of this executor, and the device has finished its command buffer: the host waited for the fence or
     /// semaphore of its submission.
     pub unsafe fn finish(&mut self, recorded: Recorded) -> Result<Run, Error> {
-        let Recorded { slot: index, plan, timing, downloads } = recorded;
+        let Recorded { slot: index, plan, timing, recorded_at, downloads } = recorded;
+        let around = recorded_at.elapsed();
         let slot = &mut self.slots[index];
         slot.frame = None;
         let memory = slot.staging.as_ref().and_then(|staging| staging.allocation.mapped_slice()).unwrap_or_default();
         let downloads = downloads.into_iter().map(|(download, place)| (download, memory[place].to_vec())).collect();
-        let measured = self.note_compacted(index, &plan).and_then(|()| self.times(index, timing, plan.passes.len()));
+        let passes = plan.passes.len();
+        let measured = self.note_compacted(index, &plan).and_then(|()| self.times(index, timing, passes, around));
         let (pass_ns, frame_ns) = measured.inspect_err(|error| self.device.note_loss(error))?;
         let passes =
             plan.passes.iter().zip(pass_ns).map(|(pass, ns)| PassTime { name: pass.name.clone(), ns }).collect();
@@ -209,6 +211,11 @@ impl Executor {
         rows
     }
 
+    /// The pipelines made so far. They are made as frames first call for them, and kept.
+    pub fn pipelines(&self) -> PipelinesMade {
+        self.pipelines.made()
+    }
+
     /// Frees resources whose handles are all dropped and that no unfinished frame uses. Every frame begins and ends
     /// with this.
     pub fn collect(&mut self) {
@@ -237,6 +244,7 @@ impl Executor {
     /// # Safety
     /// As for [`Executor::record`].
     unsafe fn record_plan(&mut self, plan: Plan, to: vk::CommandBuffer, timing: Timing) -> Result<Recorded, Error> {
+        let recorded_at = Instant::now();
         let index = self.free_slot()?;
         let frame = self.next_frame;
         let objects = self.resources.resolve(&plan, frame, self.oldest_unfinished())?;
@@ -272,7 +280,7 @@ impl Executor {
         slot.frame = Some(frame);
         self.next_frame += 1;
         self.resources.note_builds(&plan);
-        Ok(Recorded { slot: index, plan, timing, downloads })
+        Ok(Recorded { slot: index, plan, timing, recorded_at, downloads })
     }
 
     fn free_slot(&mut self) -> Result<usize, Error> {
@@ -291,8 +299,14 @@ impl Executor {
         self.slots.iter().filter_map(|slot| slot.frame).min().unwrap_or(u64::MAX)
     }
 
-    /// The times of each pass, and of the whole frame.
-    fn times(&self, slot: usize, timing: Timing, passes: usize) -> Result<(Vec<Option<u64>>, Option<u64>), Error> {
+    /// The times of each pass, and of the whole frame, which was under way within `around`.
+    fn times(
+        &self,
+        slot: usize,
+        timing: Timing,
+        passes: usize,
+        around: Duration,
+    ) -> Result<(Vec<Option<u64>>, Option<u64>), Error> {
         let limits = &self.device.info.limits;
         let count = timestamp_count(timing, passes);
         let Some(timestamps) = self.slots[slot].timestamps.as_ref().filter(|_| limits.timestamp_valid_bits > 0) else {
@@ -301,7 +315,8 @@ impl Executor {
         let ticks = timestamps.read(&self.device, count)?;
         let between = |pair: &[Option<u64>]| match pair {
             [Some(from), Some(to)] => {
-                Some(elapsed_ns(*from, *to, limits.timestamp_valid_bits, limits.timestamp_period_ns))
+                let ns = elapsed_ns(*from, *to, limits.timestamp_valid_bits, limits.timestamp_period_ns);
+                believed_ns(ns, around)
             }
             _ => None,
         };

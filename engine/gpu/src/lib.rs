@@ -55,6 +55,7 @@ pub use executor::{Executor, ExecutorOptions};
 pub use features::{DeviceRequirements, Feature, FeatureRequirement, Version};
 pub use info::{DeviceInfo, DeviceKind, Limits, devices};
 pub use messages::{Message, Messages, Validation};
+pub use pipeline::PipelinesMade;
 pub use pipeline_cache::NOT_KEPT;
 pub use present::{HostSurface, Presenter, Target};
 pub use resources::MemoryRow;

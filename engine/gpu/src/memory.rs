@@ -77,15 +77,21 @@ impl Memory {
         if let Some(limit) = self.limit.filter(|limit| bytes > limit.saturating_sub(self.used)) {
             return Err(over_limit(self.used, limit));
         }
-        let name = what;
-        let scheme = AllocationScheme::GpuAllocatorManaged;
-        let desc = AllocationCreateDesc { name, requirements, location, linear, allocation_scheme: scheme };
-        let allocation = self.allocator.allocate(&desc).map_err(|error| out_of_memory(what, bytes, &error))?;
-        let used = self.allocator.capacity();
-        if let Some(limit) = self.limit.filter(|limit| used > *limit) {
-            let _ = self.allocator.free(allocation);
-            return Err(over_limit(used, limit));
-        }
+        let mut within = |allocation_scheme| {
+            let desc = AllocationCreateDesc { name: what, requirements, location, linear, allocation_scheme };
+            let allocation = self.allocator.allocate(&desc).map_err(|error| out_of_memory(what, bytes, &error))?;
+            let used = self.allocator.capacity();
+            match self.limit.filter(|limit| used > *limit) {
+                Some(limit) => {
+                    let _ = self.allocator.free(allocation);
+                    Err(over_limit(used, limit))
+                }
+                None => Ok(allocation),
+            }
+        };
+        // Where a block for several is too much, one of just this size may not be. It is dedicated to nothing in particular.
+        let alone = AllocationScheme::DedicatedBuffer(vk::Buffer::null());
+        let allocation = within(AllocationScheme::GpuAllocatorManaged).or_else(|_| within(alone))?;
         self.used += allocation.size();
         Ok(allocation)
     }

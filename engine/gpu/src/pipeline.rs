@@ -7,10 +7,11 @@ use crate::pipeline_cache::{NOT_KEPT, PipelineCache};
 use crate::shader_limits;
 use crate::vulkan_types as to_vk;
 use ash::vk;
-use mica_graph::{BindingKind, Format, Sampler, Shader, Stage};
+use mica_graph::{BindingKind, Effects, Format, Sampler, Shader, Stage};
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// A pipeline with its layouts. Plain handles: they live as long as the executor.
 #[derive(Clone, Copy, Debug)]
@@ -29,19 +30,31 @@ pub(crate) struct Attachments {
     pub(crate) depth: Option<Format>,
 }
 
+/// The pipelines that an executor has made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PipelinesMade {
+    /// How many: one for each shader, variant and set of effects that a frame ran.
+    pub count: usize,
+    /// How long that took, in nanoseconds.
+    pub ns: u64,
+}
+
 /// All pipelines made so far.
 pub(crate) struct Pipelines {
     device: Arc<Device>,
     pub(crate) cache: PipelineCache,
     samplers: HashMap<Sampler, vk::Sampler>,
-    /// By the shader's address: shaders are statics, so it is their identity.
-    made: HashMap<(usize, Attachments), Pipeline>,
+    /// By the shader's address (shaders are statics, so it is their identity) and the effects that it is specialised for.
+    made: HashMap<(usize, Effects, Attachments), Pipeline>,
+    /// How long they took.
+    took: Duration,
 }
 
 impl Pipelines {
     pub(crate) fn new(device: Arc<Device>, path: Option<PathBuf>) -> Result<Self, Error> {
         let cache = PipelineCache::new(&device, path)?;
-        let mut pipelines = Self { device, cache, samplers: HashMap::new(), made: HashMap::new() };
+        let mut pipelines =
+            Self { device, cache, samplers: HashMap::new(), made: HashMap::new(), took: Duration::ZERO };
         for kind in [Sampler::Nearest, Sampler::Linear, Sampler::LinearWrapU] {
             // SAFETY: the description asks for no feature.
             let sampler =
@@ -51,14 +64,20 @@ impl Pipelines {
         Ok(pipelines)
     }
 
+    /// How many there are, and how long it took to make them.
+    pub(crate) fn made(&self) -> PipelinesMade {
+        PipelinesMade { count: self.made.len(), ns: self.took.as_nanos() as u64 }
+    }
+
     /// The pipeline of a shader for certain attachments.
     pub(crate) fn get(
         &mut self,
         pass: &str,
         shader: &'static Shader,
+        effects: Effects,
         attachments: &Attachments,
     ) -> Result<Pipeline, Error> {
-        let key = (std::ptr::from_ref(shader) as usize, attachments.clone());
+        let key = (std::ptr::from_ref(shader) as usize, effects, attachments.clone());
         if let Some(pipeline) = self.made.get(&key) {
             return Ok(*pipeline);
         }
@@ -77,8 +96,10 @@ impl Pipelines {
             format!("{} {}", shader.name, shader.variant)
         };
         // What drivers do with damaged code is theirs to choose: they never see it.
+        let start = Instant::now();
         let is_whole = shader.stages.iter().all(|stage| shader_limits::is_whole(stage.spirv));
-        let made = if is_whole { self.make(shader, attachments) } else { Err(vk::Result::ERROR_INVALID_SHADER_NV) };
+        let made =
+            if is_whole { self.make(shader, effects, attachments) } else { Err(vk::Result::ERROR_INVALID_SHADER_NV) };
         let made = made.map_err(|result| match result {
             vk::Result::ERROR_OUT_OF_HOST_MEMORY | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => Error::OutOfMemory {
                 what: format!("the pipeline of pass {pass}"),
@@ -88,13 +109,19 @@ impl Pipelines {
             vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost { pass: Some(pass.to_owned()) },
             _ => Error::Pipeline { pass: pass.to_owned(), shader: name.clone(), result },
         })?;
+        self.took += start.elapsed();
         self.device.set_name(made.raw, &name);
         self.cache.is_changed = true;
         self.made.insert(key, made);
         Ok(made)
     }
 
-    fn make(&self, shader: &'static Shader, attachments: &Attachments) -> Result<Pipeline, vk::Result> {
+    fn make(
+        &self,
+        shader: &'static Shader,
+        effects: Effects,
+        attachments: &Attachments,
+    ) -> Result<Pipeline, vk::Result> {
         let device = &self.device.raw;
         let set_layout = self.set_layout(shader)?;
         let stages = shader.stages.iter().fold(vk::ShaderStageFlags::empty(), |all, it| all | to_vk::stage(it.stage));
@@ -109,10 +136,11 @@ impl Pipelines {
             // SAFETY: nothing uses the layout.
             unsafe { device.destroy_descriptor_set_layout(set_layout, None) }
         })?;
+        let called_for = Specialization::new(shader.effects, effects);
         let made = if stages == vk::ShaderStageFlags::COMPUTE {
-            self.compute(shader, layout).map(|raw| (raw, vk::PipelineBindPoint::COMPUTE))
+            self.compute(shader, &called_for, layout).map(|raw| (raw, vk::PipelineBindPoint::COMPUTE))
         } else {
-            self.raster(shader, attachments, layout).map(|raw| (raw, vk::PipelineBindPoint::GRAPHICS))
+            self.raster(shader, &called_for, attachments, layout).map(|raw| (raw, vk::PipelineBindPoint::GRAPHICS))
         };
         let (raw, bind_point) = made.inspect_err(|_| {
             // SAFETY: nothing uses the layouts.
@@ -154,9 +182,15 @@ impl Pipelines {
         unsafe { self.device.raw.create_descriptor_set_layout(&info, None) }
     }
 
-    fn compute(&self, shader: &Shader, layout: vk::PipelineLayout) -> Result<vk::Pipeline, vk::Result> {
+    fn compute(
+        &self,
+        shader: &Shader,
+        called_for: &Specialization,
+        layout: vk::PipelineLayout,
+    ) -> Result<vk::Pipeline, vk::Result> {
         let modules = Modules::new(&self.device, shader)?;
-        let stages = modules.stages();
+        let specialization = called_for.info();
+        let stages = modules.stages(&specialization);
         let info = vk::ComputePipelineCreateInfo::default().stage(stages[0]).layout(layout);
         // SAFETY: the module and the layout are alive, and the layout was made from the shader's own bindings.
         let made = unsafe { self.device.raw.create_compute_pipelines(self.cache.raw, &[info], None) };
@@ -166,11 +200,13 @@ impl Pipelines {
     fn raster(
         &self,
         shader: &Shader,
+        called_for: &Specialization,
         attachments: &Attachments,
         layout: vk::PipelineLayout,
     ) -> Result<vk::Pipeline, vk::Result> {
         let modules = Modules::new(&self.device, shader)?;
-        let stages = modules.stages();
+        let specialization = called_for.info();
+        let stages = modules.stages(&specialization);
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
         let assembly =
             vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
@@ -238,6 +274,33 @@ impl Drop for Pipelines {
     }
 }
 
+/// The values of the specialisation constants that a shader asks about.
+struct Specialization {
+    entries: Vec<vk::SpecializationMapEntry>,
+    values: Vec<u8>,
+}
+
+impl Specialization {
+    fn new(asked: Effects, called_for: Effects) -> Self {
+        let mut specialization = Self { entries: Vec::new(), values: Vec::new() };
+        for effect in asked.iter() {
+            let value = vk::Bool32::from(called_for.contains(effect)).to_ne_bytes();
+            specialization.entries.push(
+                vk::SpecializationMapEntry::default()
+                    .constant_id(effect.bits().trailing_zeros())
+                    .offset(specialization.values.len() as u32)
+                    .size(value.len()),
+            );
+            specialization.values.extend(value);
+        }
+        specialization
+    }
+
+    fn info(&self) -> vk::SpecializationInfo<'_> {
+        vk::SpecializationInfo::default().map_entries(&self.entries).data(&self.values)
+    }
+}
+
 /// Shader modules, for as long as a pipeline is made from them.
 struct Modules<'a> {
     device: &'a Device,
@@ -257,9 +320,10 @@ impl<'a> Modules<'a> {
         if modules.made.is_empty() { Err(vk::Result::ERROR_INITIALIZATION_FAILED) } else { Ok(modules) }
     }
 
-    fn stages(&self) -> Vec<vk::PipelineShaderStageCreateInfo<'static>> {
+    fn stages<'b>(&self, specialization: &'b vk::SpecializationInfo<'b>) -> Vec<vk::PipelineShaderStageCreateInfo<'b>> {
         let stage = |(stage, module): &(Stage, vk::ShaderModule)| {
-            vk::PipelineShaderStageCreateInfo::default().stage(to_vk::stage(*stage)).module(*module).name(c"main")
+            let info = vk::PipelineShaderStageCreateInfo::default().stage(to_vk::stage(*stage)).module(*module);
+            info.name(c"main").specialization_info(specialization)
         };
         self.made.iter().map(stage).collect()
     }

@@ -330,7 +330,7 @@ impl<'a> Preparation<'a, '_> {
             let (given, wants) = (params.len(), shader.params_bytes);
             return Err(self.bad_pass(format!("{given} bytes of push constants for a shader of {wants}")));
         }
-        let pipeline = self.pipelines.get(&self.pass.name, shader, attachments)?;
+        let pipeline = self.pipelines.get(&self.pass.name, shader, self.pass.effects, attachments)?;
         let set = write_set(self, shader, &pipeline)?;
         Ok(Program { pipeline, set, params })
     }

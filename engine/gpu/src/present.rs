@@ -6,7 +6,6 @@ use crate::device::Device;
 use crate::error::{Call, Error};
 use ash::{khr, vk};
 use std::sync::Arc;
-use std::time::Duration;
 
 /// Where to present. There is one thread for it: nobody else uses the queue during a call.
 pub struct HostSurface<'a> {
@@ -68,7 +67,7 @@ impl Target {
 }
 
 /// How long to wait for an image before the next try: a window that is hidden may give none.
-const PATIENCE: Duration = Duration::from_secs(1);
+const PATIENCE_NS: u64 = 1_000_000_000;
 
 impl Presenter {
     /// Looks at a surface. No swapchain is made yet.
@@ -118,6 +117,8 @@ impl Presenter {
     /// [`Error::SurfaceLost`], after which another presenter is needed, or a lack of memory or the device.
     pub fn acquire(&mut self, [width, height]: [u32; 2]) -> Result<Option<Target>, Error> {
         let asked = vk::Extent2D { width, height };
+        // The image of an acquisition that was given up goes with its swapchain, which must not go before it came.
+        self.wait_for_image(1)?;
         if width == 0 || height == 0 {
             self.discard();
             return Ok(None);
@@ -126,17 +127,10 @@ impl Presenter {
             return Ok(None);
         }
         let Some(chain) = &mut self.chain else { return Ok(None) };
-        let patience_ns = u64::try_from(PATIENCE.as_nanos()).unwrap_or(u64::MAX);
-        // SAFETY: the fence was given to the acquisition under way, if there is one.
-        let wait = |device: &Device, fence| unsafe { device.raw.wait_for_fences(&[fence], true, patience_ns) };
-        if self.is_acquiring {
-            wait(&self.device, self.acquired).call("vkWaitForFences")?;
-            self.is_acquiring = false;
-        }
         // SAFETY: no acquisition is under way, and the fence is unsignalled once it is reset.
         let acquired = unsafe {
             self.device.raw.reset_fences(&[self.acquired]).call("vkResetFences")?;
-            self.swapchains.acquire_next_image(chain.raw, patience_ns, vk::Semaphore::null(), self.acquired)
+            self.swapchains.acquire_next_image(chain.raw, PATIENCE_NS, vk::Semaphore::null(), self.acquired)
         };
         let (index, suboptimal) = match acquired {
             Ok(found) => found,
@@ -149,14 +143,32 @@ impl Presenter {
         };
         chain.is_stale |= suboptimal;
         self.is_acquiring = true;
-        // Without memory or patience the image is acquired all the same: one more try, then another swapchain.
-        if let Err(result) = wait(&self.device, self.acquired).or_else(|_| wait(&self.device, self.acquired)) {
-            chain.is_stale = true;
-            return Err(result).call("vkWaitForFences");
-        }
-        self.is_acquiring = false;
         let (image, drawn) = chain.images[index as usize];
-        Ok(Some(Target { index, image, extent: chain.extent, drawn }))
+        let target = Target { index, image, extent: chain.extent, drawn };
+        // Until the image is there another swapchain is needed for the next one.
+        let is_stale = std::mem::replace(&mut chain.is_stale, true);
+        // Without memory or patience the image is acquired all the same: one more try.
+        self.wait_for_image(2)?;
+        if let Some(chain) = &mut self.chain {
+            chain.is_stale = is_stale;
+        }
+        Ok(Some(target))
+    }
+
+    /// Waits so many times for the acquisition under way, if there is one.
+    fn wait_for_image(&mut self, tries: u32) -> Result<(), Error> {
+        if !self.is_acquiring {
+            return Ok(());
+        }
+        // SAFETY: the fence was given to the acquisition.
+        let wait = || unsafe { self.device.raw.wait_for_fences(&[self.acquired], true, PATIENCE_NS) };
+        let waited = (1..tries).fold(wait(), |waited, _| waited.or_else(|_| wait()));
+        if waited == Err(vk::Result::TIMEOUT) {
+            return Err(Error::Timeout { seconds: f64::from(tries) * PATIENCE_NS as f64 * 1e-9, pass: None });
+        }
+        waited.call("vkWaitForFences")?;
+        self.is_acquiring = false;
+        Ok(())
     }
 
     /// Records a copy of a picture to the whole of a target, stretched where the sizes differ.

@@ -4,6 +4,7 @@ use crate::timing::{PassTime, Timing};
 use mica_graph::{Download, Plan};
 use std::collections::HashMap;
 use std::ops::Range;
+use std::time::Instant;
 
 /// A frame that was recorded into a command buffer of the host. Once the device has finished it, it goes to
 /// [`crate::Executor::finish`]; until then it keeps its staging memory, and its plan keeps the resources.
@@ -13,6 +14,8 @@ pub struct Recorded {
     pub(crate) slot: usize,
     pub(crate) plan: Plan,
     pub(crate) timing: Timing,
+    /// Before anything of it could run.
+    pub(crate) recorded_at: Instant,
     /// Where each download lies in staging memory.
     pub(crate) downloads: HashMap<Download, Range<usize>>,
 }

@@ -3,6 +3,7 @@
 use crate::device::Device;
 use crate::error::{Call, Error};
 use ash::vk;
+use std::time::Duration;
 
 /// How a frame is timed. The two are never mixed: a barrier between passes changes what is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -67,6 +68,14 @@ pub fn elapsed_ns(from: u64, to: u64, valid_bits: u32, period_ns: f32) -> u64 {
     if period_ns == 1.0 { ticks } else { (ticks as f64 * f64::from(period_ns)).round() as u64 }
 }
 
+/// A time of the device, if it fits into what passed on the host's clock around it. A clock of the device that jumps or runs
+/// backwards gives any number, mostly a huge one: a time that cannot be is no time.
+pub(crate) fn believed_ns(ns: u64, around: Duration) -> Option<u64> {
+    // Clocks differ by parts in a million, and coarse ones tick after a while.
+    let most = around + around / 16 + Duration::from_millis(1);
+    (u128::from(ns) <= most.as_nanos()).then_some(ns)
+}
+
 /// Processor time that all threads of this process have taken, in nanoseconds; `None` where the system does not say.
 /// It hardly moves when other processes take a core, which doubles any other time (measured on lavapipe: 1 to 7 %).
 pub fn process_cpu_ns() -> Option<u64> {
@@ -81,7 +90,8 @@ pub fn process_cpu_ns() -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
-    use super::elapsed_ns;
+    use super::{believed_ns, elapsed_ns};
+    use std::time::Duration;
 
     #[test]
     fn a_counter_that_wraps_once_is_understood() {
@@ -89,6 +99,17 @@ mod tests {
         let last = (1_u64 << bits) - 1;
         assert_eq!(elapsed_ns(last - 9, 90, bits, 1.0), 100);
         assert_eq!(elapsed_ns(u64::MAX - 9, 90, 64, 1.0), 100);
+    }
+
+    #[test]
+    fn f40_a_time_that_is_longer_than_the_frame_was_under_way_is_none() {
+        let around = Duration::from_millis(160);
+        assert_eq!(believed_ns(160_000_000, around), Some(160_000_000));
+        assert_eq!(believed_ns(171_000_000, around), Some(171_000_000), "two clocks differ a little");
+        assert_eq!(believed_ns(171_000_001, around), None);
+        assert_eq!(believed_ns(elapsed_ns(100, 99, 64, 1.0), around), None, "it ran backwards");
+        assert_eq!(believed_ns(elapsed_ns(100, 99, 36, 1.0), around), None, "a counter of few bits ran backwards");
+        assert_eq!(believed_ns(0, Duration::ZERO), Some(0));
     }
 
     #[test]

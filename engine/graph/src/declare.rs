@@ -1,7 +1,7 @@
 //! What should happen in a frame: passes in order, each with the resources it uses.
 
 use crate::resource::{Buffer, Extent, Format, Image, ImageDesc, Lifetime, Resource};
-use crate::shader::{Access, Bind, Shader, Slot, Stages};
+use crate::shader::{Access, Bind, Effects, Shader, Slot, Stages};
 use crate::structure::{MeshRange, StructureInstance};
 use std::sync::Arc;
 
@@ -25,6 +25,15 @@ pub struct Draw {
     pub vertices: u32,
     /// `gl_InstanceIndex`.
     pub instance: u32,
+}
+
+/// How many groups of a compute shader run.
+#[derive(Clone, Copy, Debug)]
+pub enum Over<'a> {
+    /// One invocation for each texel.
+    Texels(Extent),
+    /// So many groups along x, y and z as stand in a buffer: three `u32` at the offset.
+    Counted(&'a Buffer, u64),
 }
 
 /// What a pass does.
@@ -125,15 +134,24 @@ pub struct Pass {
     pub work: Work,
     /// What it uses.
     pub uses: Vec<Use>,
+    /// The effects that it is specialised for: of those that its shader asks about, the ones that are called for.
+    pub effects: Effects,
 }
 
 /// A frame: what should happen.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Graph {
     pub(crate) passes: Vec<Pass>,
     pub(crate) exports: Vec<Arc<Resource>>,
     pub(crate) downloads: u32,
     why: String,
+    effects: Effects,
+}
+
+impl Default for Graph {
+    fn default() -> Self {
+        Self { passes: Vec::new(), exports: Vec::new(), downloads: 0, why: String::new(), effects: Effects::ALL }
+    }
 }
 
 impl Graph {
@@ -157,6 +175,11 @@ impl Graph {
         self.why = why.into();
     }
 
+    /// Says which effects the passes declared from here on are called for; the next call replaces it. At first it is all.
+    pub fn specialize(&mut self, effects: Effects) {
+        self.effects = effects;
+    }
+
     /// Runs a compute shader with one invocation for each texel of `extent`.
     pub fn pass<B: Bind>(&mut self, bind: B, params: B::Params, extent: Extent) {
         self.pass_named(B::SHADER.name, bind, params, extent);
@@ -173,6 +196,18 @@ impl Graph {
 
     /// Runs a compute shader over the groups counted in `arguments` (three `u32` at `offset`).
     pub fn pass_indirect<B: Bind>(&mut self, bind: B, params: B::Params, arguments: &Buffer, offset: u64) {
+        self.pass_indirect_named(B::SHADER.name, bind, params, arguments, offset);
+    }
+
+    /// As [`Graph::pass_indirect`], under another name, for a shader that serves twice in a frame.
+    pub fn pass_indirect_named<B: Bind>(
+        &mut self,
+        name: impl Into<String>,
+        bind: B,
+        params: B::Params,
+        arguments: &Buffer,
+        offset: u64,
+    ) {
         let params = B::params_bytes(&params);
         let mut uses = uses_of(&bind);
         uses.push(Use {
@@ -181,7 +216,15 @@ impl Graph {
             access: Access::IndirectRead,
             stages: Stages::INDIRECT,
         });
-        self.push(B::SHADER.name, Work::ComputeIndirect { shader: B::SHADER, params, offset }, uses);
+        self.push(name, Work::ComputeIndirect { shader: B::SHADER, params, offset }, uses);
+    }
+
+    /// Runs a compute shader over what there is known of here or there.
+    pub fn pass_over<B: Bind>(&mut self, bind: B, params: B::Params, over: Over) {
+        match over {
+            Over::Texels(extent) => self.pass(bind, params, extent),
+            Over::Counted(arguments, offset) => self.pass_indirect(bind, params, arguments, offset),
+        }
     }
 
     /// Draws into the attachments in `bind`, all of size `extent`, cleared first: colours to 0, depth to 0 (far).
@@ -279,7 +322,7 @@ impl Graph {
     /// Runs one shader wherever another is declared, so that two forms of a pass can be compared in the same frame; returns how
     /// often it was. Both have the same bindings, parameters and groups, or nothing is exchanged.
     pub fn exchange(&mut self, declared: &'static Shader, other: &'static Shader) -> usize {
-        let interface = |of: &'static Shader| (of.bindings, of.params_bytes, of.group, of.outputs);
+        let interface = |of: &'static Shader| (of.bindings, of.params_bytes, of.group, of.outputs, of.effects);
         if interface(declared) != interface(other) {
             return 0;
         }
@@ -296,9 +339,15 @@ impl Graph {
         exchanged
     }
 
+    /// Appends a pass of another graph with other work: everything else is as there.
+    pub fn push_with(&mut self, pass: &Pass, work: Work) {
+        self.passes.push(Pass { work, ..pass.clone() });
+    }
+
     /// Appends a pass as it is. Passes of shaders are better declared with [`Graph::pass`], whose uses cannot be wrong.
     pub fn push(&mut self, name: impl Into<String>, work: Work, uses: Vec<Use>) {
-        self.passes.push(Pass { name: name.into(), why: self.why.clone(), work, uses });
+        let effects = work.shader().map_or(Effects::NONE, |shader| shader.effects.intersection(self.effects));
+        self.passes.push(Pass { name: name.into(), why: self.why.clone(), work, uses, effects });
     }
 }
 

@@ -46,8 +46,8 @@ mod structure;
 mod synchronize;
 
 pub use check::PlanError;
-pub use declare::{Download, Draw, Graph, Pass, Use, Work};
+pub use declare::{Download, Draw, Graph, Over, Pass, Use, Work};
 pub use plan::{Barrier, Placement, Plan, Requirements, Step, Usage};
 pub use resource::{Buffer, BufferDesc, Description, Extent, Format, Image, ImageDesc, Lifetime, Resource, ResourceId};
-pub use shader::{Access, Bind, Binding, BindingKind, Sampler, Shader, Slot, Stage, StageCode, Stages};
+pub use shader::{Access, Bind, Binding, BindingKind, Effects, Sampler, Shader, Slot, Stage, StageCode, Stages};
 pub use structure::{MeshRange, Structure, StructureDesc, StructureInstance, TrianglesDesc};

@@ -181,6 +181,70 @@ pub struct StageCode {
     pub spirv: &'static [u32],
 }
 
+/// A set of effects that a frame may call for, a bit each: what a shader does for an effect that is not called for is not compiled into
+/// its pipeline. The bits are the numbers in `layout(constant_id = N)`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Effects(u32);
+
+impl Effects {
+    /// None.
+    pub const NONE: Self = Self(0);
+    /// Every one.
+    pub const ALL: Self = Self(u32::MAX);
+
+    /// The one with the specialisation constant `id`, below 32.
+    pub const fn one(id: u32) -> Self {
+        Self(1 << id)
+    }
+
+    /// The bits.
+    pub const fn bits(self) -> u32 {
+        self.0
+    }
+
+    /// Whether every one of `other` is among these.
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// Whether there are none.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// These and those.
+    pub const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// What is among both.
+    pub const fn intersection(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
+    /// These, and those if `called_for`.
+    pub const fn and_if(self, called_for: bool, other: Self) -> Self {
+        if called_for { self.union(other) } else { self }
+    }
+
+    /// These without those.
+    pub const fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
+    /// Each alone.
+    pub fn iter(self) -> impl Iterator<Item = Self> {
+        (0..u32::BITS).map(Self::one).filter(move |&one| self.contains(one))
+    }
+}
+
+impl BitOr for Effects {
+    type Output = Self;
+    fn bitor(self, other: Self) -> Self {
+        self.union(other)
+    }
+}
+
 /// A compiled shader: one compute stage, or a vertex and a fragment stage.
 #[derive(Debug)]
 pub struct Shader {
@@ -198,6 +262,8 @@ pub struct Shader {
     pub params_bytes: u32,
     /// Names of the fragment stage's outputs, by location.
     pub outputs: &'static [&'static str],
+    /// The effects that its code asks about.
+    pub effects: Effects,
 }
 
 /// Where a use is attached to its shader.

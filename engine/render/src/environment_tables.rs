@@ -1,9 +1,12 @@
-//! The environment on the device: the map with its levels, and the tables made from it once something needs them.
+//! The environment on the device: the map with its levels, and the tables made from it, each once something calls for it and until
+//! nothing does.
 
+use crate::census::EnvironmentCensus;
 use crate::passes;
 use crate::scene::{EquirectMap, SmallLight};
 use mica_graph::{Buffer, Extent, Format, Graph, Image, ImageDesc, Lifetime};
 use mica_shaders::{constants as c, types};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// A distribution of microfacet normals.
@@ -24,13 +27,20 @@ pub(crate) struct Lobe {
 }
 
 impl Lobe {
-    fn new(name: &str) -> Self {
-        let prefiltered =
-            ImageDesc { layers: c::SPECULAR_LAYERS, ..ImageDesc::new(Format::Rgba32Float, Extent::new(256, 128)) };
-        let albedo = ImageDesc::new(Format::Rg32Float, Extent::new(c::ALBEDO_SIZE, c::ALBEDO_SIZE));
+    fn new(ndf: Ndf) -> Self {
+        let name = match ndf {
+            Ndf::Ggx => "ggx",
+            Ndf::Beckmann => "beckmann",
+        };
+        let extents = [Extent::new(256, 128), Extent::new(c::ALBEDO_SIZE, c::ALBEDO_SIZE)];
+        Self::of_size(&[format!("environment_{name}"), format!("albedo_{name}")], extents, c::SPECULAR_LAYERS)
+    }
+
+    fn of_size([prefiltered, albedo]: &[String; 2], extents: [Extent; 2], layers: u32) -> Self {
+        let desc = ImageDesc { layers, ..ImageDesc::new(Format::Rgba32Float, extents[0]) };
         Self {
-            prefiltered: Image::new(format!("environment_{name}"), prefiltered, Lifetime::Scene),
-            albedo: Image::new(format!("albedo_{name}"), albedo, Lifetime::Scene),
+            prefiltered: Image::new(prefiltered, desc, Lifetime::Scene),
+            albedo: Image::new(albedo, ImageDesc::new(Format::Rg32Float, extents[1]), Lifetime::Scene),
         }
     }
 }
@@ -50,62 +60,104 @@ pub(crate) struct Cones {
 /// Widest map that means over cones are taken of, texels: a sixth of a degree each.
 const CONE_MAP_WIDTH: u32 = 2048;
 
+/// Which tables a frame calls for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Called {
+    /// Something is diffuse.
+    pub irradiance: bool,
+    /// Something mirrors without glints.
+    pub ggx: bool,
+}
+
+/// What shaders bind where there is no table, and do not read.
+struct Absent {
+    irradiance: Image,
+    lobe: Lobe,
+}
+
 /// The environment, or its absence.
 pub(crate) struct EnvironmentTables {
-    present: bool,
+    census: Option<EnvironmentCensus>,
     map: Image,
     pending: Option<Arc<[u8]>>,
     /// The map, or its first level that is no wider than [`CONE_MAP_WIDTH`].
     cone_map: EquirectMap,
-    irradiance: Image,
-    irradiance_ready: bool,
-    ggx: Lobe,
-    ggx_ready: bool,
+    irradiance: Option<Image>,
+    ggx: Option<Lobe>,
+    beckmann: Option<Lobe>,
+    /// By the half-angle in radians, as bits.
+    cones: BTreeMap<u64, Cones>,
+    absent: Absent,
+    is_simulated: bool,
+    generation: u64,
+    fingerprint: Option<String>,
+    /// What was exchanged since the last update, the only thing of which there may be something on the device.
+    exchanged: Option<Box<EnvironmentTables>>,
 }
 
 impl EnvironmentTables {
     /// The tables of a map; without one, of a single black texel that no shader reads.
     pub fn new(map: Option<&EquirectMap>) -> Self {
-        let black = EquirectMap { width: 1, height: 1, texels: vec![[0.0; 3]] };
-        let mut levels = levels(map.unwrap_or(&black));
-        let extent = Extent::new(levels[0].width, levels[0].height);
+        Self::of(map, map.map(EquirectMap::fingerprint), 0)
+    }
+
+    fn of(map: Option<&EquirectMap>, fingerprint: Option<String>, generation: u64) -> Self {
+        let mut finest = map.cloned().unwrap_or_else(|| EquirectMap::constant([0.0; 3]));
+        let bad_texels = finest.repair().bad_texels();
+        let size = [finest.width, finest.height];
+        let mut levels = levels(finest);
+        let extent = Extent::new(size[0], size[1]);
         let desc = ImageDesc { mips: levels.len() as u32, ..ImageDesc::new(Format::Rgba32Float, extent) };
         let bytes = rgba_bytes(levels.iter().flat_map(|level| &level.texels));
         let fits = levels.iter().position(|level| level.width <= CONE_MAP_WIDTH).unwrap_or(0);
         let cone_map = levels.swap_remove(fits);
-        let lobe = if map.is_some() { Lobe::new("ggx") } else { Self::absent_lobe() };
-        let irradiance_extent = if map.is_some() { Extent::new(64, 32) } else { Extent::new(1, 1) };
+        let one = Extent::new(1, 1);
+        let absent = ["irradiance_absent", "environment_absent", "albedo_absent"].map(str::to_owned);
+        let [irradiance, prefiltered, albedo] = absent;
         Self {
-            present: map.is_some(),
+            census: map.map(|_| EnvironmentCensus::of(size, &cone_map, bad_texels)),
             map: Image::new("environment", desc, Lifetime::Scene),
             pending: Some(bytes),
             cone_map,
-            irradiance: Image::new(
-                "environment_irradiance",
-                ImageDesc::new(Format::Rgba32Float, irradiance_extent),
-                Lifetime::Scene,
-            ),
-            irradiance_ready: map.is_none(),
-            ggx: lobe,
-            ggx_ready: map.is_none(),
+            irradiance: None,
+            ggx: None,
+            beckmann: None,
+            cones: BTreeMap::new(),
+            absent: Absent {
+                irradiance: Image::new(irradiance, ImageDesc::new(Format::Rgba32Float, one), Lifetime::Scene),
+                lobe: Lobe::of_size(&[prefiltered, albedo], [one, one], 1),
+            },
+            is_simulated: false,
+            generation,
+            fingerprint,
+            exchanged: None,
         }
     }
 
-    fn absent_lobe() -> Lobe {
-        let one = Extent::new(1, 1);
-        Lobe {
-            prefiltered: Image::new(
-                "environment_absent",
-                ImageDesc { layers: 1, ..ImageDesc::new(Format::Rgba32Float, one) },
-                Lifetime::Scene,
-            ),
-            albedo: Image::new("albedo_absent", ImageDesc::new(Format::Rg32Float, one), Lifetime::Scene),
+    /// Takes another map, or none: everything made from the last one is given back, once there is an update without it.
+    pub fn replace(&mut self, map: Option<&EquirectMap>) {
+        let fingerprint = map.map(EquirectMap::fingerprint);
+        if fingerprint == self.fingerprint {
+            return;
+        }
+        match self.exchanged.take() {
+            Some(earlier) if earlier.fingerprint == fingerprint => *self = *earlier,
+            earlier => {
+                let next = Self::of(map, fingerprint, self.generation + 1);
+                let last = std::mem::replace(self, next);
+                self.exchanged = earlier.or_else(|| Some(Box::new(last)));
+            }
         }
     }
 
-    /// Whether there is an environment.
-    pub fn present(&self) -> bool {
-        self.present
+    /// Counts the maps there have been: what was made from an earlier one is stale.
+    pub fn generation(&self) -> u64 {
+        self.generation
+    }
+
+    /// What there is of it.
+    pub fn census(&self) -> Option<&EnvironmentCensus> {
+        self.census.as_ref()
     }
 
     /// The map with its levels.
@@ -115,59 +167,98 @@ impl EnvironmentTables {
 
     /// Irradiance by normal, over pi.
     pub fn irradiance(&self) -> &Image {
-        &self.irradiance
+        self.irradiance.as_ref().unwrap_or(&self.absent.irradiance)
     }
 
     /// The tables of the materials' lobe.
     pub fn ggx(&self) -> &Lobe {
-        &self.ggx
+        self.ggx.as_ref().unwrap_or(&self.absent.lobe)
     }
 
-    /// Declares the upload of the map and the tables that base shading reads, the first time.
-    pub fn update(&mut self, g: &mut Graph) {
-        if let Some(bytes) = self.pending.take() {
+    /// The tables of the flakes' smooth limit.
+    pub fn beckmann(&self) -> &Lobe {
+        self.beckmann.as_ref().unwrap_or(&self.absent.lobe)
+    }
+
+    /// What flakes whose cones have this half-angle mirror, where it was called for.
+    pub fn cones(&self, half_angle_radians: f64) -> Option<&Cones> {
+        self.cones.get(&half_angle_radians.to_bits())
+    }
+
+    /// Whether the last frame was called for an environment, be it a black one.
+    pub fn is_simulated(&self) -> bool {
+        self.is_simulated
+    }
+
+    /// Declares the upload of the map and the tables that base shading calls for, where they are not there yet; gives back those
+    /// that nothing calls for.
+    pub fn update(&mut self, g: &mut Graph, simulated: bool, called: Called) {
+        self.exchanged = None;
+        self.is_simulated = simulated;
+        if simulated && let Some(bytes) = self.pending.take() {
+            g.because("first frame of the environment");
             g.upload_image(&mut self.map, bytes);
         }
-        if !self.irradiance_ready {
+        if !called.irradiance {
+            self.irradiance = None;
+        } else if self.irradiance.is_none() {
             g.because("diffuse surfaces under the environment; first frame with this map");
-            passes::environment::irradiance(g, &self.map, &mut self.irradiance);
-            self.irradiance_ready = true;
+            let desc = ImageDesc::new(Format::Rgba32Float, Extent::new(64, 32));
+            let mut irradiance = Image::new("environment_irradiance", desc, Lifetime::Scene);
+            passes::environment::irradiance(g, &self.map, &mut irradiance);
+            self.irradiance = Some(irradiance);
         }
-        if !self.ggx_ready {
+        if !called.ggx {
+            self.ggx = None;
+        } else if self.ggx.is_none() {
             g.because("smooth reflections of the environment; first frame with this map");
-            passes::environment::specular(g, &self.map, Ndf::Ggx, &mut self.ggx);
-            self.ggx_ready = true;
+            self.ggx = Some(lobe(g, &self.map, Ndf::Ggx));
         }
     }
 
-    /// What flakes whose cones have this half-angle mirror; declares the uploads.
+    /// Gives back what glints called for, as far as none of these methods' materials does any more.
+    pub fn keep(&mut self, beckmann: bool, half_angles_radians: &[f64]) {
+        if !beckmann {
+            self.beckmann = None;
+        }
+        self.cones.retain(|kept, _| half_angles_radians.iter().any(|half_angle| half_angle.to_bits() == *kept));
+    }
+
+    /// What flakes whose cones have this half-angle mirror: declares the uploads, the first time.
     ///
     /// Computed here, in f64: this is what other methods are held against. A light that is larger than a cone is left in the map, which is
     /// fine enough for it.
-    pub fn cones(&self, g: &mut Graph, half_angle_radians: f64) -> Cones {
+    pub fn call_for_cones(&mut self, g: &mut Graph, half_angle_radians: f64) {
+        if self.cones(half_angle_radians).is_some() {
+            return;
+        }
         let (mut lights, _) = self.cone_map.part_small_lights();
         lights.retain(|light| light.radius_radians <= half_angle_radians);
         // As fine as the map, within reason, and never so coarse that linear interpolation shows.
-        let width = if self.present { self.cone_map.width.clamp(256, 1024) } else { 1 };
+        let width = if self.census.is_some() { self.cone_map.width.clamp(256, 1024) } else { 1 };
         let means = self.cone_map.without(&lights).cone_means(half_angle_radians, width);
         let extent = Extent::new(means.width, means.height);
         let mut table = Image::new("environment_cone", ImageDesc::new(Format::Rgba32Float, extent), Lifetime::Settings);
         g.upload_image(&mut table, rgba_bytes(&means.texels));
         let (rings, buffer) = upload_lights(g, &lights, half_angle_radians);
-        Cones { means: table, rings, lights: buffer, light_count: lights.len() as u32 }
+        let cones = Cones { means: table, rings, lights: buffer, light_count: lights.len() as u32 };
+        self.cones.insert(half_angle_radians.to_bits(), cones);
     }
 
-    /// The tables of the flakes' smooth limit; declares the passes that fill them.
-    pub fn beckmann(&self, g: &mut Graph) -> Lobe {
-        if !self.present {
-            return Self::absent_lobe();
+    /// Declares the passes that fill the tables of the flakes' smooth limit, the first time, where there is an environment.
+    pub fn call_for_beckmann(&mut self, g: &mut Graph) {
+        if self.beckmann.is_none() && self.is_simulated {
+            self.beckmann = Some(lobe(g, &self.map, Ndf::Beckmann));
         }
-        let mut lobe = Lobe::new("beckmann");
-        passes::environment::specular(g, &self.map, Ndf::Beckmann, &mut lobe);
-        lobe
     }
 }
 
+/// The tables of a lobe; declares the passes that fill them.
+fn lobe(g: &mut Graph, map: &Image, ndf: Ndf) -> Lobe {
+    let mut lobe = Lobe::new(ndf);
+    passes::environment::specular(g, map, ndf, &mut lobe);
+    lobe
+}
 /// Texels as an image of four channels holds them.
 fn rgba_bytes<'a>(texels: impl IntoIterator<Item = &'a [f32; 3]>) -> Arc<[u8]> {
     let texels: Vec<[f32; 4]> = texels.into_iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
@@ -208,8 +299,8 @@ fn upload_lights(g: &mut Graph, lights: &[SmallLight], half_angle_radians: f64) 
 }
 
 /// The map and every coarser level down to one texel high.
-fn levels(map: &EquirectMap) -> Vec<EquirectMap> {
-    let mut levels = vec![map.clone()];
+fn levels(map: EquirectMap) -> Vec<EquirectMap> {
+    let mut levels = vec![map];
     while let Some(last) = levels.last()
         && (last.width > 1 || last.height > 1)
     {

@@ -4,10 +4,13 @@
 //! [`mica_gpu::Executor`] on a device of its own, or one that records into a host's command buffer.
 
 mod cache;
+mod census;
 mod embedded;
 mod environment_tables;
 mod filled;
+mod frame;
 mod methods;
+mod moved;
 mod occluders;
 mod passes;
 mod renderer;
@@ -17,16 +20,18 @@ mod settings;
 mod view;
 
 pub use cache::{Cache, CacheError};
+pub use census::{Census, Effect, EnvironmentCensus, GlintCensus, LightCensus, MaterialCensus};
 pub use embedded::{EMBEDDED_SCENES, EmbeddedScene, embedded_scene};
+pub use frame::{Frame, LeftOut};
 pub use methods::{
-    COMMON_SETTINGS, Claim, DEFAULT_METHOD, GlintMaterial, JakobTable, METHODS, MethodInfo, Rung,
-    lit_probability_table, method,
+    AUTO_METHOD, COMMON_SETTINGS, Claim, DEFAULT_METHOD, GlintMaterial, JakobTable, METHODS, MethodInfo, Rung,
+    check_method, lit_probability_table, method,
 };
 /// What [`Renderer::trace`] reads and writes.
 pub use mica_shaders::types::{Ray, RayAnswer, RayCounts};
 pub use occluders::{OcclusionBackend, RaysOfPass};
 pub use passes::trace::Question;
-pub use renderer::{Environment, Frame, LeftOut, Progress, Renderer, Update};
+pub use renderer::{Environment, Progress, Renderer, Update};
 pub use settings::{Kind, Setting, SettingError, Value, Values};
 pub use view::View;
 
@@ -52,6 +57,22 @@ pub enum RenderError {
     /// An instance that is to be moved does not exist.
     #[error("there is no instance {index}: the scene has {count}, counted from 0")]
     NoSuchInstance {
+        /// Which was named.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A material that is to be replaced does not exist.
+    #[error("there is no material {index}: the scene has {count}, counted from 0")]
+    NoSuchMaterial {
+        /// Which was named.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A material's texture does not exist.
+    #[error("there is no texture {index}: the scene has {count}, counted from 0")]
+    NoSuchTexture {
         /// Which was named.
         index: usize,
         /// How many there are.

@@ -1,6 +1,7 @@
 //! The scene as the shaders read it: buffers and texture atlases, filled once.
 
 use crate::filled::{Filled, FilledImage};
+use crate::moved::Moved;
 use crate::scene::bvh::LARGEST_COORDINATE;
 use crate::scene::{
     AlphaMode, Atlas, AtlasImage, AtlasRecord, Bounds, Instance, Light, Material, Mesh, Scene, TextureRef, Wrap,
@@ -9,8 +10,9 @@ use crate::{GlintMaterial, RenderError};
 use glam::{DAffine3, DVec3};
 use mica_graph::{Buffer, Draw, Extent, Format, Graph, ImageDesc, Lifetime, MeshRange};
 use mica_shaders::{constants as c, types};
-use std::collections::BTreeSet;
 use std::sync::Arc;
+
+const FIRST: &str = "first frame of the scene";
 
 /// Everything about the scene that is on the device.
 pub(crate) struct SceneBuffers {
@@ -33,12 +35,14 @@ pub(crate) struct SceneBuffers {
     pub atlas_srgb: FilledImage,
     pub atlas_linear: FilledImage,
     pub lights: Filled,
+    light_records: Vec<types::Light>,
+    uploaded_lights: Option<Vec<types::Light>>,
     pub light_count: u32,
     /// Where each mesh lies in `indices` and `positions`.
     pub mesh_places: Vec<MeshRange>,
     mesh_bounds: Vec<Option<Bounds>>,
     /// The instances that moved since the last update.
-    moved: BTreeSet<usize>,
+    pub moved: Moved,
     base_materials: Vec<types::Material>,
     uploaded_materials: Option<Arc<[u8]>>,
 }
@@ -89,9 +93,9 @@ impl SceneBuffers {
         let draws: Vec<Draw> = scene.instances.iter().enumerate().map(draw).collect();
         let instances = instance_records(scene, &mesh_places, center);
         let mesh_bounds: Vec<Option<Bounds>> = scene.meshes.iter().map(Mesh::bounds).collect();
-        let light_data: Vec<types::Light> = lights.iter().map(|light| light_record(light, center)).collect();
+        let light_records: Vec<types::Light> = lights.iter().map(|light| light_record(light, center)).collect();
         let records: Vec<types::TextureRecord> = atlas.records.iter().map(texture_record).collect();
-        let base_materials: Vec<types::Material> = scene.materials.iter().map(|m| material_record(m, atlas)).collect();
+        let base_materials: Vec<types::Material> = scene.materials.iter().map(material_record).collect();
 
         let materials_bytes = (base_materials.len().max(1) * size_of::<types::Material>()) as u64;
         Ok(Self {
@@ -109,11 +113,13 @@ impl SceneBuffers {
             textures: Filled::new("textures", &records),
             atlas_srgb: atlas_image("atlas_srgb", Format::Rgba8Srgb, &atlas.srgb),
             atlas_linear: atlas_image("atlas_linear", Format::Rgba8, &atlas.linear),
-            lights: Filled::new("lights", &light_data),
-            light_count: light_data.len() as u32,
+            lights: Filled::new("lights", &light_records),
+            light_count: light_records.len() as u32,
+            light_records,
+            uploaded_lights: None,
             mesh_places,
             mesh_bounds,
-            moved: BTreeSet::new(),
+            moved: Moved::default(),
             base_materials,
             uploaded_materials: None,
         })
@@ -129,9 +135,15 @@ impl SceneBuffers {
         corners(self.mesh_bounds[mesh], DAffine3::IDENTITY).map(|corner| corner.as_vec3().to_array())
     }
 
-    /// Takes note that an instance moved.
-    pub fn note_moved(&mut self, instance: usize) {
-        self.moved.insert(instance);
+    /// Takes other lights; the next update uploads them if they differ from those that are there.
+    pub fn set_lights(&mut self, lights: &[Light]) {
+        self.light_records = lights.iter().map(|light| light_record(light, self.center)).collect();
+        self.light_count = self.light_records.len() as u32;
+    }
+
+    /// Takes another material; its textures are the scene's.
+    pub fn set_material(&mut self, index: usize, material: &Material) {
+        self.base_materials[index] = material_record(material);
     }
 
     /// Whether an instance of a mesh can be there: within the coordinates that rays can be traced through.
@@ -145,8 +157,7 @@ impl SceneBuffers {
 
     /// Declares the uploads that are still to be done, and those that follow from instances that moved.
     pub fn update(&mut self, g: &mut Graph, scene: &Scene) {
-        const FIRST: &str = "first frame of the scene";
-        if let Some(why) = why_moved(&self.moved) {
+        if let Some(why) = self.moved.why() {
             self.scene_unit = scene_unit(scene, &self.mesh_bounds, self.center);
             g.because(if self.instances.is_pending() { FIRST.to_owned() } else { why });
             self.instances.replace(&instance_records(scene, &self.mesh_places, self.center));
@@ -156,19 +167,22 @@ impl SceneBuffers {
         g.because(FIRST);
         self.instances.upload(g);
         self.upload_triangles(g);
-        let buffers = [
-            &mut self.normals,
-            &mut self.tangents,
-            &mut self.uvs,
-            &mut self.colors,
-            &mut self.textures,
-            &mut self.lights,
-        ];
+        let buffers = [&mut self.normals, &mut self.tangents, &mut self.uvs, &mut self.colors, &mut self.textures];
         for filled in buffers {
             filled.upload(g);
         }
         self.atlas_srgb.upload(g);
         self.atlas_linear.upload(g);
+        self.upload_lights(g);
+    }
+
+    fn upload_lights(&mut self, g: &mut Graph) {
+        if self.uploaded_lights.as_ref() != Some(&self.light_records) {
+            g.because(if self.uploaded_lights.is_some() { "the lights changed" } else { FIRST });
+            self.lights = Filled::new("lights", &self.light_records);
+            self.lights.upload(g);
+            self.uploaded_lights = Some(self.light_records.clone());
+        }
     }
 
     /// Declares the uploads of what triangles are made of, if they are still to be done.
@@ -178,10 +192,13 @@ impl SceneBuffers {
     }
 
     /// Declares the upload of the materials with the glints' part as it is now, if that differs from the last one.
-    pub fn upload_materials(&mut self, g: &mut Graph, glints: &[GlintMaterial]) {
+    /// Each comes with the number of its layer of glints.
+    pub fn upload_materials(&mut self, g: &mut Graph, glints: &[(GlintMaterial, u32)]) {
         let mut materials = self.base_materials.clone();
-        for glint in glints {
+        for (list, (glint, layer)) in (1..).zip(glints) {
             let material = &mut materials[glint.index];
+            material.glint_list = list;
+            material.flags |= layer << c::MATERIAL_LAYER_SHIFT;
             let [r, g, b] = glint.values.color("color");
             material.glint_color = [r, g, b, glint.values.number("uv_scale") as f32];
             material.glint_uv_set = glint.uv_set;
@@ -195,23 +212,10 @@ impl SceneBuffers {
         }
         let bytes: Arc<[u8]> = Arc::from(bytemuck::cast_slice::<_, u8>(&materials));
         if self.uploaded_materials.as_ref() != Some(&bytes) {
-            g.because(if self.uploaded_materials.is_some() {
-                "a material changed"
-            } else {
-                "first frame of the scene"
-            });
+            g.because(if self.uploaded_materials.is_some() { "a material changed" } else { FIRST });
             g.upload(&mut self.materials, bytes.clone());
             self.uploaded_materials = Some(bytes);
         }
-    }
-}
-
-/// Why something is made again after instances moved; nothing where none did.
-pub(crate) fn why_moved(moved: &BTreeSet<usize>) -> Option<String> {
-    match moved.len() {
-        0 => None,
-        1 => moved.first().map(|index| format!("instance {index} moved")),
-        count => Some(format!("{count} instances moved")),
     }
 }
 
@@ -298,7 +302,7 @@ fn light_record(light: &Light, center: DVec3) -> types::Light {
     }
 }
 
-fn material_record(material: &Material, atlas: &Atlas) -> types::Material {
+fn material_record(material: &Material) -> types::Material {
     let flag = |set: bool, flag: u32| if set { flag } else { 0 };
     // Reflectance at normal incidence by the index of refraction; 0 stands for total reflection (KHR_materials_ior).
     let ior = material.ior;
@@ -311,7 +315,7 @@ fn material_record(material: &Material, atlas: &Atlas) -> types::Material {
         if let Some(texture) = texture {
             textures[texture_count] = types::TextureUse {
                 row_u: texture.transform[0],
-                texture: atlas.index_of(texture.texture),
+                texture: texture.texture as u32,
                 row_v: texture.transform[1],
                 slot_and_set: slot << 1 | texture.uv_set,
             };

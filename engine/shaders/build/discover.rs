@@ -17,7 +17,7 @@ struct Choice {
     key: &'static str,
 }
 
-const CHOICES: [Choice; 7] = [
+const CHOICES: [Choice; 8] = [
     Choice { include: "method.glsl", folder: "methods", key: "method" },
     Choice { include: "occlusion.glsl", folder: "occlusion", key: "occlusion" },
     Choice { include: "probability.glsl", folder: "rungs/probability", key: "probability" },
@@ -25,6 +25,7 @@ const CHOICES: [Choice; 7] = [
     Choice { include: "arithmetic.glsl", folder: "rungs/arithmetic", key: "arithmetic" },
     Choice { include: "bits.glsl", folder: "rungs/bits", key: "bits" },
     Choice { include: "unary.glsl", folder: "rungs/unary", key: "unary" },
+    Choice { include: "group.glsl", folder: "rungs/group", key: "group" },
 ];
 
 /// Passes that are compiled once more with `NAIVE_FORMS` defined, under their name and `_naive`: what their stable forms cost

@@ -1,6 +1,6 @@
 //! The Rust that is derived from the shaders, as text.
 
-use super::glsl::{Constant, Value};
+use super::glsl::{Constant, Effect, Value};
 use super::layout::{Struct, Structs};
 use super::merge::{Bound, Interface};
 use super::reflect::{Access, Kind, Stage, snake_case};
@@ -48,8 +48,14 @@ pub struct Unit {
     pub docs: Docs,
 }
 
-/// Writes the module tree: one module for each shader, `types`, `constants` and `ALL`.
-pub fn emit(units: &[Unit], structs: &Structs, struct_docs: &Docs, constants: &[(String, Constant)]) -> String {
+/// Writes the module tree: one module for each shader, `types`, `constants`, `effects` and `ALL`.
+pub fn emit(
+    units: &[Unit],
+    structs: &Structs,
+    struct_docs: &Docs,
+    constants: &[(String, Constant)],
+    effects: &[Effect],
+) -> String {
     let mut rust = String::new();
     let mut by_name: BTreeMap<&str, Vec<&Unit>> = BTreeMap::new();
     for unit in units {
@@ -73,6 +79,7 @@ pub fn emit(units: &[Unit], structs: &Structs, struct_docs: &Docs, constants: &[
     }
     emit_types(&mut rust, structs, struct_docs);
     emit_constants(&mut rust, constants);
+    emit_effects(&mut rust, effects);
     doc(&mut rust, &["Every shader in every variant."]);
     let all = units.iter().map(|unit| match unit.module.as_str() {
         "" => format!("&{}::SHADER", field(&unit.name)),
@@ -130,7 +137,8 @@ fn emit_shader(rust: &mut String, unit: &Unit) {
     }
     let bytes = interface.params.as_ref().map_or(0, |params| params.bytes);
     let outputs: Vec<&str> = interface.outputs.iter().map(|output| output.name.as_str()).collect();
-    line(rust, &format!("], params_bytes: {bytes}, outputs: &{outputs:?} }};"));
+    line(rust, &format!("], params_bytes: {bytes}, outputs: &{outputs:?},"));
+    line(rust, &format!("effects: {} }};", effects_of(interface.effects)));
 }
 
 fn emit_bind(rust: &mut String, unit: &Unit) {
@@ -347,6 +355,26 @@ fn emit_constants(rust: &mut String, constants: &[(String, Constant)]) {
         line(rust, &format!("pub const {}: {ty} = {value};", constant.name));
     }
     line(rust, "}");
+}
+
+fn emit_effects(rust: &mut String, effects: &[Effect]) {
+    doc(rust, &["What a frame may call for: the specialisation constants of `shared/effects.glsl`."]);
+    line(rust, "pub mod effects {");
+    for Effect { name, number, declaration } in effects {
+        doc(rust, &[&declaration.doc]);
+        line(rust, &format!("pub const {name}: ::mica_graph::Effects = ::mica_graph::Effects::one({number});"));
+    }
+    doc(rust, &["Each with its name."]);
+    let all = effects.iter().map(|effect| format!("({0:?}, {0})", effect.name)).collect::<Vec<_>>().join(", ");
+    line(rust, &format!("pub const ALL: &[(&str, ::mica_graph::Effects)] = &[{all}];"));
+    line(rust, "}");
+}
+
+/// A set of effects as Rust.
+fn effects_of(bits: u32) -> String {
+    let ones = (0..u32::BITS).filter(|number| bits >> number & 1 == 1);
+    let ones = ones.map(|number| format!("::mica_graph::Effects::one({number})"));
+    ones.reduce(|all, next| format!("{all}.union({next})")).unwrap_or_else(|| "::mica_graph::Effects::NONE".to_owned())
 }
 
 fn static_name(stage: Stage) -> &'static str {

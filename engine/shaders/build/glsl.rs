@@ -35,6 +35,17 @@ pub enum Value {
     Float(f32),
 }
 
+/// A top-level `layout(constant_id = N) const bool`: an effect that a frame may call for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effect {
+    /// Its name.
+    pub name: String,
+    /// Its number.
+    pub number: u32,
+    /// Where it is and what its comment says.
+    pub declaration: Declaration,
+}
+
 /// The text of one GLSL file, taken apart.
 #[derive(Debug, Default)]
 pub struct Source {
@@ -48,6 +59,8 @@ pub struct Source {
     pub members: HashMap<(String, String), Declaration>,
     /// The constants, in order.
     pub constants: Vec<Constant>,
+    /// The effects, in order.
+    pub effects: Vec<Effect>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -90,6 +103,8 @@ impl Source {
         if tokens[end].0 == Token::Mark(';') {
             if let Some(constant) = constant(lexed, head) {
                 self.constants.push(constant);
+            } else if let Some(effect) = effect(lexed, head) {
+                self.effects.push(effect);
             } else if declares(&["uniform", "buffer", "in", "out"])
                 && let Some((name, line)) = last_word(head)
             {
@@ -287,6 +302,20 @@ fn constant(lexed: &Lexed, head: &[(Token, u32)]) -> Option<Constant> {
         _ => return None,
     };
     Some(Constant { name: name.clone(), value, declaration: declaration(lexed, *line, *first) })
+}
+
+/// Reads `layout(constant_id = N) const bool NAME = ...`.
+fn effect(lexed: &Lexed, head: &[(Token, u32)]) -> Option<Effect> {
+    let words: Vec<&str> = head
+        .iter()
+        .map(|(token, _)| match token {
+            Token::Word(word) | Token::Number(word) => word.as_str(),
+            Token::Mark(_) => "",
+        })
+        .collect();
+    let ["layout", "", "constant_id", "", number, "", "const", "bool", name, "", ..] = words[..] else { return None };
+    let declaration = declaration(lexed, head[8].1, head[0].1);
+    Some(Effect { name: name.to_owned(), number: u32::try_from(integer(number)?).ok()?, declaration })
 }
 
 fn integer(number: &str) -> Option<i64> {

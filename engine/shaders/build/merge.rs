@@ -25,6 +25,8 @@ pub struct Interface {
     pub outputs: Vec<Varying>,
     /// Whether it draws.
     pub raster: bool,
+    /// A bit for each effect that its code asks about.
+    pub effects: u32,
 }
 
 /// Joins the stages of a shader.
@@ -39,6 +41,7 @@ pub fn merge(stages: &[(Stage, &Reflection)]) -> Result<Interface, Vec<Complaint
         group: [1; 3],
         outputs: Vec::new(),
         raster: stages.iter().any(|(stage, _)| *stage != Stage::Compute),
+        effects: stages.iter().flat_map(|(_, found)| &found.effects).fold(0, |all, (_, number)| all | 1 << number),
     };
     for (stage, reflection) in stages {
         for binding in &reflection.bindings {

@@ -13,7 +13,7 @@ pub mod spirv;
 use compile::{Module, Outcome, Tools, in_folder};
 use discover::{Found, Job};
 use emit::{Docs, Unit};
-use glsl::Constant;
+use glsl::{Constant, Effect};
 use layout::Structs;
 use problem::Problem;
 use reflect::{Complaint, Reflection, Stage};
@@ -83,6 +83,10 @@ pub fn generate(root: &Path, out: &Path, tools: &Tools) -> Result<Generated, Vec
         problems.extend(found);
         Vec::new()
     });
+    let effects = effects(root, &found).unwrap_or_else(|found| {
+        problems.extend(found);
+        Vec::new()
+    });
     // Variants repeat what they share. The order stays: what the compiler says first is the cause of the rest.
     for list in [&mut problems, &mut warnings] {
         let mut known = HashSet::new();
@@ -91,7 +95,8 @@ pub fn generate(root: &Path, out: &Path, tools: &Tools) -> Result<Generated, Vec
     if !problems.is_empty() {
         return Err(problems);
     }
-    Ok(Generated { rust: emit::emit(&units, &structs, &struct_docs, &constants), warnings })
+    let rust = emit::emit(&units, &structs, &struct_docs, &constants, &effects);
+    Ok(Generated { rust, warnings })
 }
 
 /// Compiles every stage of every job, on as many threads as there are cores; outcomes in the order of the jobs.
@@ -240,4 +245,26 @@ fn constants(root: &Path, found: &Found) -> Result<Vec<(String, Constant)>, Vec<
         }
     }
     if problems.is_empty() { Ok(constants) } else { Err(problems) }
+}
+
+/// Where effects are declared: nowhere else.
+const EFFECTS: &str = "shared/effects.glsl";
+
+/// The effects that a frame may call for.
+fn effects(root: &Path, found: &Found) -> Result<Vec<Effect>, Vec<Problem>> {
+    let mut problems = Vec::new();
+    for (path, source) in found.sources.iter().filter(|(path, _)| *path != EFFECTS) {
+        for effect in &source.effects {
+            let message = format!("`{}` is an effect: declare it in {EFFECTS}", effect.name);
+            problems.push(Problem::at(in_folder(root, path), effect.declaration.line, message));
+        }
+    }
+    let effects = found.sources.get(EFFECTS).map(|source| source.effects.clone()).unwrap_or_default();
+    for (index, effect) in effects.iter().enumerate() {
+        if let Some(other) = effects[..index].iter().find(|other| other.number == effect.number) {
+            let message = format!("`{}` has the number of `{}`", effect.name, other.name);
+            problems.push(Problem::at(in_folder(root, EFFECTS), effect.declaration.line, message));
+        }
+    }
+    if problems.is_empty() { Ok(effects) } else { Err(problems) }
 }

@@ -112,6 +112,8 @@ pub struct Reflection {
     pub structs: Structs,
     /// Names of the bindings that are declared and not used; they need not be bound.
     pub unused: Vec<String>,
+    /// The effects that its code asks about: name and number of each specialisation constant.
+    pub effects: Vec<(String, u32)>,
 }
 
 /// Something that Mica's shaders may not do, with the name in the GLSL it is about (empty: the whole file).
@@ -163,8 +165,14 @@ pub fn reflect(module: &Module, stage: Stage, origin: &str) -> Result<Reflection
             complaints.push(Complaint::new(name, format!("`{name}` becomes a Rust type: write it in camel case")));
         }
     }
-    if module.is_specialised() {
-        complaints.push(Complaint::new("", "specialisation constants are not set by Mica: use a #define or a variant"));
+    for (id, number, default) in module.specializations() {
+        let name = module.name(id);
+        if default != Some(true) || number >= u32::BITS {
+            let message =
+                format!("`{name}` is no effect: specialisation constants are bools that are true, numbered below 32");
+            complaints.push(Complaint::new(name, message));
+        }
+        reflection.effects.push((name.to_owned(), number));
     }
     match stage {
         Stage::Compute => reflection.group = module.local_size.unwrap_or([1; 3]),

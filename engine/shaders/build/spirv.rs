@@ -85,6 +85,10 @@ pub struct Module {
     decorations: HashMap<(u32, Option<u32>, u32), u32>,
     /// What the code refers to through pointers.
     pointers: HashSet<u32>,
+    /// Specialisation constants by id: whether they are true by default; none of those that are no booleans.
+    specializations: HashMap<u32, Option<bool>>,
+    /// What the code refers to otherwise.
+    values: HashSet<u32>,
 }
 
 impl Module {
@@ -139,6 +143,10 @@ impl Module {
             (43, [_, id, value]) => {
                 self.constants.insert(*id, *value);
             }
+            // OpSpecConstantTrue, OpSpecConstantFalse, and others.
+            (48, [_, id]) => self.specialize(*id, Some(true)),
+            (49, [_, id]) => self.specialize(*id, Some(false)),
+            (50 | 51, [_, id, ..]) => self.specialize(*id, None),
             (59, [pointer, id, storage, ..]) => {
                 self.variables.push(Variable { id: *id, pointer: *pointer, storage: *storage });
             }
@@ -149,13 +157,20 @@ impl Module {
                 self.decorations.insert((*id, Some(*member), *decoration), operands.first().copied().unwrap_or(0));
             }
             // What takes a pointer: calls, texel pointers, loads, stores, copies, access chains, lengths, atomics.
-            (57, [_, _, _, arguments @ ..]) => self.pointers.extend(arguments),
+            (57, [_, _, _, arguments @ ..]) => {
+                self.pointers.extend(arguments);
+                self.values.extend(arguments);
+            }
             (60 | 61 | 65..=68 | 70 | 83 | 227 | 229..=242, [_, _, pointer, ..]) => {
                 self.pointers.insert(*pointer);
             }
-            (62 | 228, [pointer, ..]) => {
+            (62 | 228, [pointer, rest @ ..]) => {
                 self.pointers.insert(*pointer);
+                self.values.extend(rest);
             }
+            // What takes a boolean: other specialisation constants, logic, selections, phis, branches and returns.
+            (52 | 80 | 164..=169 | 245, [_, _, arguments @ ..]) => self.values.extend(arguments),
+            (250 | 254, arguments) => self.values.extend(arguments),
             (63, [to, from, ..]) => self.pointers.extend([to, from]),
             _ => {}
         }
@@ -180,9 +195,21 @@ impl Module {
         self.pointers.contains(&variable.id)
     }
 
-    /// Whether there are specialisation constants.
-    pub fn is_specialised(&self) -> bool {
-        self.decorations.keys().any(|&(_, _, decoration)| decoration == decoration::SPEC_ID)
+    fn specialize(&mut self, id: u32, default: Option<bool>) {
+        self.specializations.insert(id, default);
+    }
+
+    /// The specialisation constants that the code refers to: each its id, its number, and whether it is true by default; none of those
+    /// that are no booleans.
+    pub fn specializations(&self) -> Vec<(u32, u32, Option<bool>)> {
+        // What is no boolean is used in more ways than are looked for.
+        let is_used = |(id, default): &(&u32, &Option<bool>)| default.is_none() || self.values.contains(*id);
+        let used = self.specializations.iter().filter(is_used);
+        let numbered =
+            used.filter_map(|(id, default)| Some((*id, self.decoration(*id, decoration::SPEC_ID)?, *default)));
+        let mut all: Vec<_> = numbered.collect();
+        all.sort_by_key(|&(_, number, _)| number);
+        all
     }
 
     /// The first operand of a decoration on an id.

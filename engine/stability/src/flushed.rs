@@ -2,7 +2,8 @@
 //! threshold becomes 0.
 //!
 //! Vulkan lets a device flush denormals wherever it likes, and not every device can be told to. So the flush is written
-//! into the SPIR-V, after each load and each arithmetic instruction that gives floats.
+//! into the SPIR-V, after each load, each read of an image, each conversion and each arithmetic instruction that gives floats,
+//! vectors or matrices of them. What only moves bits (bitcasts, selections, swizzles) gives what it was given.
 
 use mica_graph::{Graph, Shader, StageCode, Work};
 use std::collections::HashMap;
@@ -21,7 +22,7 @@ pub fn flushed(graph: &Graph, below: f32) -> Graph {
         {
             *shader = shaders.entry(*shader).or_insert_with(|| flushed_shader(shader, below));
         }
-        changed.push(pass.name.clone(), work, pass.uses.clone());
+        changed.push_with(pass, work);
     }
     changed
 }
@@ -41,19 +42,26 @@ const OP_TYPE_BOOL: u32 = 20;
 const OP_TYPE_INT: u32 = 21;
 const OP_TYPE_FLOAT: u32 = 22;
 const OP_TYPE_VECTOR: u32 = 23;
+const OP_TYPE_MATRIX: u32 = 24;
 const OP_CONSTANT: u32 = 43;
 const OP_CONSTANT_COMPOSITE: u32 = 44;
 const OP_CONSTANT_NULL: u32 = 46;
 const OP_FUNCTION: u32 = 54;
 const OP_LOAD: u32 = 61;
 const OP_DECORATE: u32 = 71;
+const OP_COMPOSITE_CONSTRUCT: u32 = 80;
+const OP_COMPOSITE_EXTRACT: u32 = 81;
 const OP_BITCAST: u32 = 124;
 const OP_SELECT: u32 = 169;
 const OP_U_LESS_THAN: u32 = 176;
 const OP_BITWISE_AND: u32 = 199;
 const NO_CONTRACTION: u32 = 42;
-/// Sums, differences, products, quotients and remainders of floats, of vectors and matrices, and dot products.
-const ARITHMETIC: [u32; 10] = [129, 131, 133, 136, 140, 141, 142, 144, 145, 148];
+/// Sums, differences, products, quotients and remainders of floats, of vectors and matrices, outer and dot products.
+const ARITHMETIC: [u32; 13] = [129, 131, 133, 136, 140, 141, 142, 143, 144, 145, 146, 147, 148];
+/// Samples, fetches, gathers and reads of images.
+const IMAGE_READS: [u32; 12] = [87, 88, 89, 90, 91, 92, 93, 94, 95, 96, 97, 98];
+/// From integers, from floats of other widths, and to half floats and back.
+const CONVERSIONS: [u32; 4] = [111, 112, 115, 116];
 
 /// What flushing numbers of one width takes: floats, or vectors of two to four.
 #[derive(Clone, Copy)]
@@ -73,15 +81,26 @@ struct Module<'a> {
     declared: Vec<u32>,
     /// By the type of floats.
     widths: HashMap<u32, Width>,
+    /// The columns of matrices by their type: what they are, and how many.
+    columns: HashMap<u32, (u32, u32)>,
     /// Results that are flushed, and the names that their instructions get.
     raw: HashMap<u32, u32>,
 }
 
 impl<'a> Module<'a> {
     fn new(words: &'a [u32], below: f32) -> Self {
-        let mut module =
-            Self { words, bound: words[3], declared: Vec::new(), widths: HashMap::new(), raw: HashMap::new() };
+        let mut module = Self {
+            words,
+            bound: words[3],
+            declared: Vec::new(),
+            widths: HashMap::new(),
+            columns: HashMap::new(),
+            raw: HashMap::new(),
+        };
         module.declare(below);
+        let matrices = instructions(words).filter(|(operation, _)| *operation == OP_TYPE_MATRIX);
+        let matrices = matrices.filter(|(_, whole)| module.widths.contains_key(&whole[2]));
+        module.columns = matrices.map(|(_, whole)| (whole[1], (whole[2], whole[3]))).collect();
         let results: Vec<u32> = instructions(words).filter_map(|(_, whole)| module.flushed_result(whole)).collect();
         for result in results {
             let raw = module.name();
@@ -138,8 +157,10 @@ impl<'a> Module<'a> {
     /// The result of an instruction that gives floats that a device might flush.
     fn flushed_result(&self, whole: &[u32]) -> Option<u32> {
         let operation = whole[0] & 0xffff;
-        let gives_floats = ARITHMETIC.contains(&operation) || operation == OP_LOAD || operation == OP_EXT_INST;
-        (gives_floats && self.widths.contains_key(&whole[1])).then(|| whole[2])
+        let gives_floats = [&ARITHMETIC[..], &IMAGE_READS, &CONVERSIONS, &[OP_LOAD, OP_EXT_INST]];
+        let gives_floats = gives_floats.iter().any(|operations| operations.contains(&operation));
+        let of_floats = || self.widths.contains_key(&whole[1]) || self.columns.contains_key(&whole[1]);
+        (gives_floats && of_floats()).then(|| whole[2])
     }
 
     fn rewritten(mut self) -> Vec<u32> {
@@ -167,6 +188,17 @@ impl<'a> Module<'a> {
 
     /// `result` is `raw`, or 0 where that is small.
     fn flush(&mut self, code: &mut Vec<u32>, of_type: u32, raw: u32, result: u32) {
+        if let Some((column_type, count)) = self.columns.get(&of_type).copied() {
+            let columns = (0..count).map(|index| {
+                let [column, flushed] = [(); 2].map(|()| self.name());
+                push(code, OP_COMPOSITE_EXTRACT, [column_type, column, raw, index]);
+                self.flush(code, column_type, column, flushed);
+                flushed
+            });
+            let columns: Vec<u32> = columns.collect();
+            push(code, OP_COMPOSITE_CONSTRUCT, [of_type, result].into_iter().chain(columns));
+            return;
+        }
         let width = self.widths[&of_type];
         let [bits, magnitude, small] = [(); 3].map(|()| self.name());
         push(code, OP_BITCAST, [width.bits_type, bits, raw]);
@@ -193,4 +225,40 @@ fn push(code: &mut Vec<u32>, operation: u32, operands: impl IntoIterator<Item = 
     code.extend(operands);
     let words = (code.len() - at) as u32;
     code[at] |= words << 16;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// In all shaders that there are: what gives floats gives them under another name, and what had their name chooses between
+    /// them and 0, matrices column by column.
+    #[test]
+    fn every_instruction_that_gives_floats_is_flushed() {
+        let mut kinds: HashMap<u32, usize> = HashMap::new();
+        for stage in mica_shaders::ALL.iter().flat_map(|shader| shader.stages) {
+            let given = Module::new(stage.spirv, LEAST_NORMAL);
+            let rewritten = Module::new(stage.spirv, LEAST_NORMAL).rewritten();
+            let chosen: HashMap<u32, u32> = instructions(&rewritten)
+                .filter(|(operation, _)| [OP_SELECT, OP_COMPOSITE_CONSTRUCT].contains(operation))
+                .map(|(operation, whole)| (whole[2], operation))
+                .collect();
+            let renamed: HashMap<u32, u32> = instructions(&rewritten)
+                .filter(|(_, whole)| given.flushed_result(whole).is_some())
+                .map(|(operation, whole)| (whole[2], operation))
+                .collect();
+            for (operation, whole) in instructions(stage.spirv) {
+                let Some(result) = given.flushed_result(whole) else { continue };
+                let is_matrix = given.columns.contains_key(&whole[1]);
+                let wanted = if is_matrix { OP_COMPOSITE_CONSTRUCT } else { OP_SELECT };
+                assert_eq!(renamed.get(&given.raw[&result]), Some(&operation));
+                assert_eq!(chosen.get(&result), Some(&wanted));
+                *kinds.entry(if is_matrix { OP_TYPE_MATRIX } else { operation }).or_default() += 1;
+            }
+        }
+        // Sums, products of a matrix and a vector, fetches and reads of images, f64 to f32, from integers, matrices.
+        for kind in [129, 145, 95, 98, 115, 111, 112, OP_TYPE_MATRIX] {
+            assert!(kinds.contains_key(&kind), "{kind} of {kinds:?}");
+        }
+    }
 }

@@ -8,15 +8,16 @@
 mod canaries;
 mod cases;
 mod count_law;
+mod counted_loops;
 mod errors;
 mod flushed;
 mod laboratory;
-mod plane;
 mod random;
 mod rays;
 mod stage;
 mod sweeps;
 mod unary;
+mod uses;
 
 pub use canaries::{Canary, canaries};
 pub use cases::CASES;
@@ -24,7 +25,8 @@ pub use errors::{share_wrong, worst_difference, worst_ratio};
 pub use laboratory::{Effort, Laboratory};
 pub use random::Random;
 pub use sweeps::{Axis, MakeSweep, SWEEPS, Series, Sweep};
-pub use unary::{UnaryLine, unary};
+pub use unary::{Trial, UnaryLine};
+pub use uses::StableForm;
 
 use serde::{Deserialize, Serialize};
 
@@ -38,6 +40,8 @@ pub struct Case {
     pub id: &'static str,
     /// What is hard.
     pub title: &'static str,
+    /// Names of the stable forms, for [`StableForm::named`].
+    pub stable: &'static [&'static str],
     /// Measures it on a device.
     pub measure: fn(&mut Laboratory) -> Result<Vec<Check>, StabilityError>,
 }
@@ -75,7 +79,7 @@ pub struct Check {
     pub inputs: u64,
     /// The form that fails.
     pub naive: Form,
-    /// The form in use.
+    /// The form that keeps them: in use, or of a library (see [`Case::stable`]).
     pub stable: Form,
     /// What the worst error of the stable form may be.
     pub tolerance: f64,

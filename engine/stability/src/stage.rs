@@ -1,11 +1,120 @@
-//! A tilted plane before a camera, which frames of the renderer show, and what f64 says of each of its pixels.
+//! Squares of flakes that frames of the renderer show: one flat on the ground in any light, and one tilted before a camera, of
+//! which f64 says what each pixel sees.
 
 use crate::{Laboratory, StabilityError};
 use glam::{DAffine3, DMat2, DMat3, DVec2, DVec3};
 use mica_gpu::Timing;
-use mica_graph::Graph;
+use mica_graph::{Graph, Image};
 use mica_render::scene::{Camera, Glint, Instance, Light, Material, Mesh, Scene};
-use mica_render::{OcclusionBackend, Renderer, View};
+use mica_render::{Environment, Frame, OcclusionBackend, Renderer, View};
+
+/// A scene of nothing but a mesh of flakes, which alone reflect, and reflect everything.
+fn of_flakes(mesh: Mesh, world_from_local: DAffine3, method: &str, glint: Glint) -> Scene {
+    let glint = Glint { color: Some([1.0; 3]), method: Some(method.to_owned()), ..glint };
+    let material = Material {
+        name: "flakes".to_owned(),
+        base_color: [0.0, 0.0, 0.0, 1.0],
+        glint: Some(glint),
+        ..Material::default()
+    };
+    Scene {
+        name: "stage".to_owned(),
+        meshes: vec![mesh],
+        instances: vec![Instance { mesh: 0, world_from_local, name: "stage".to_owned() }],
+        materials: vec![material],
+        ..Scene::default()
+    }
+}
+
+/// Four corners in the order of a square's outline, to two triangles of a mesh.
+fn add_square(mesh: &mut Mesh, corners: [([f32; 3], [f32; 2]); 4], normal: [f32; 3]) {
+    let first = mesh.positions.len() as u32;
+    for (position, uv) in corners {
+        mesh.positions.push(position);
+        mesh.normals.push(normal);
+        mesh.uv[0].push(uv);
+    }
+    mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|corner| first + corner));
+}
+
+fn empty_mesh() -> Mesh {
+    Mesh { name: "stage".to_owned(), has_uv: true, ..Mesh::default() }
+}
+
+/// A square of the plane y = 0 about the origin, facing up. Its flakes alone reflect, and they reflect everything.
+pub struct Plane {
+    /// Half its side, metres.
+    pub half: f32,
+    /// Added to its texture coordinates, which are x and z.
+    pub uv: [f32; 2],
+    /// Towards the only light, whose irradiance is 1.
+    pub light: Option<DVec3>,
+    /// Light from everywhere.
+    pub environment: Option<Environment>,
+}
+
+impl Plane {
+    /// The plane as a method renders it, with these settings.
+    ///
+    /// # Errors
+    /// Those of the renderer and its settings.
+    pub fn renderer(&self, method: &str, settings: &[(&str, &str)]) -> Result<Renderer, StabilityError> {
+        let [low, high] = [-self.half, self.half];
+        let corners = [[low, low], [low, high], [high, high], [high, low]]
+            .map(|[x, z]| ([x, 0.0, z], [x + self.uv[0], z + self.uv[1]]));
+        let mut mesh = empty_mesh();
+        add_square(&mut mesh, corners, [0.0, 1.0, 0.0]);
+        let scene = of_flakes(mesh, DAffine3::IDENTITY, method, Glint::default());
+        let sun = |towards: DVec3| Light::Directional { direction: -towards, irradiance: [1.0; 3] };
+        let lights: Vec<Light> = self.light.map(sun).into_iter().collect();
+        let mut renderer = Renderer::new(scene, &lights, self.environment.as_ref(), OcclusionBackend::None)?;
+        for (key, value) in settings {
+            renderer.set(None, key, value)?;
+        }
+        Ok(renderer)
+    }
+}
+
+/// Radiance in the green channel of every pixel.
+///
+/// # Errors
+/// Those of the renderer and of the device.
+pub fn radiance(laboratory: &mut Laboratory, renderer: &mut Renderer, view: &View) -> Result<Vec<f64>, StabilityError> {
+    let [pixels] = pixels(laboratory, renderer, view, |frame| [&frame.radiance])?;
+    Ok(pixels.into_iter().map(|[_, green, ..]| f64::from(green)).collect())
+}
+
+/// Where in texture space the middle of every pixel lies, as methods are told.
+///
+/// # Errors
+/// Those of the renderer and of the device.
+pub fn texture_places(
+    laboratory: &mut Laboratory,
+    renderer: &mut Renderer,
+    view: &View,
+) -> Result<Vec<[f64; 2]>, StabilityError> {
+    let [pixels] = pixels(laboratory, renderer, view, |frame| [&frame.uv])?;
+    Ok(pixels.into_iter().map(|[u, v, ..]| [f64::from(u), f64::from(v)]).collect())
+}
+
+/// The pixels of some of a frame's images.
+fn pixels<const N: usize>(
+    laboratory: &mut Laboratory,
+    renderer: &mut Renderer,
+    view: &View,
+    images: impl FnOnce(&Frame) -> [&Image; N],
+) -> Result<[Vec<[f32; 4]>; N], StabilityError> {
+    let mut graph = Graph::new();
+    let frame = renderer.frame(&mut graph, view, None)?;
+    let downloads = images(&frame).map(|image| graph.download_image(image));
+    let mut run = laboratory.executor.run(graph, Timing::Overlapped)?;
+    Ok(downloads.map(|download| bytemuck::pod_collect_to_vec(&run.take(download))))
+}
+
+/// The plane's local frame, with the normal along +Z: a direction of the world in it.
+pub fn local(world: DVec3) -> DVec3 {
+    DVec3::new(world.x, -world.z, world.y)
+}
 
 /// A square, and an eye before its middle.
 #[derive(Clone, Copy, Debug)]
@@ -76,17 +185,14 @@ impl Stage {
     }
 
     fn mesh(&self) -> Mesh {
-        let mut mesh = Mesh { name: "stage".to_owned(), has_uv: true, ..Mesh::default() };
+        let mut mesh = empty_mesh();
         for (left, right, jump) in [(-1.0, 0.0, 0.0), (0.0, 1.0, self.uv_jump)] {
-            let first = mesh.positions.len() as u32;
-            for (x, y) in [(left, -1.0), (right, -1.0), (right, 1.0), (left, 1.0)] {
+            let corners = [(left, -1.0), (right, -1.0), (right, 1.0), (left, 1.0)].map(|(x, y)| {
                 let at = self.half * DVec2::new(x, y);
-                mesh.positions.push([at.x as f32, at.y as f32, 0.0]);
-                mesh.normals.push([0.0, 0.0, 1.0]);
                 let uv = self.uv_per_metre * at + self.uv_offset;
-                mesh.uv[0].push([(uv.x + jump) as f32, uv.y as f32]);
-            }
-            mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|corner| first + corner));
+                ([at.x as f32, at.y as f32, 0.0], [(uv.x + jump) as f32, uv.y as f32])
+            });
+            add_square(&mut mesh, corners, [0.0, 0.0, 1.0]);
         }
         mesh
     }
@@ -94,29 +200,12 @@ impl Stage {
     /// The scene, its square placed by a transform in f64, under one light from straight above.
     pub fn scene(&self) -> Scene {
         let (method, count) = self.flakes;
-        let glint = Glint {
-            count,
-            alpha: ALPHA,
-            gamma_deg: GAMMA_DEG,
-            color: Some([1.0; 3]),
-            method: Some(method.to_owned()),
-            ..Glint::default()
-        };
-        let material = Material {
-            name: "stage".to_owned(),
-            base_color: [0.0, 0.0, 0.0, 1.0],
-            glint: Some(glint),
-            ..Material::default()
-        };
+        let glint = Glint { count, alpha: ALPHA, gamma_deg: GAMMA_DEG, ..Glint::default() };
         let world_from_local = self.world_from_local();
-        Scene {
-            name: "stage".to_owned(),
-            meshes: vec![self.mesh()],
-            instances: vec![Instance { mesh: 0, world_from_local, name: "stage".to_owned() }],
-            materials: vec![material],
-            lights: vec![Light::Directional { direction: -world_from_local.matrix3.z_axis, irradiance: [1.0; 3] }],
-            ..Scene::default()
-        }
+        let mut scene = of_flakes(self.mesh(), world_from_local, method, glint);
+        let irradiance = [1.0; 3];
+        scene.lights = vec![Light::Directional { direction: -world_from_local.matrix3.z_axis, irradiance }];
+        scene
     }
 
     /// The same with its corners in world space, as f32 has them.
@@ -149,15 +238,10 @@ impl Stage {
             // Fewer passes, and still more flakes than any footprint here holds by chance.
             renderer.set(None, "most", "2000")?;
         }
-        let mut graph = Graph::new();
-        let frame = renderer.frame(&mut graph, &self.view(), None)?;
-        let [radiance, uv, footprint] =
-            [&frame.radiance, &frame.uv, &frame.footprint].map(|image| graph.download_image(image));
-        let mut run = laboratory.executor.run(graph, Timing::Overlapped)?;
-        let [radiance, uv, footprint] = [radiance, uv, footprint].map(|image| {
-            let pixels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&run.take(image));
-            pixels
-        });
+        let [radiance, uv, footprint] = pixels(laboratory, &mut renderer, &self.view(), |frame| {
+            // Where nothing glints there are no footprints.
+            [&frame.radiance, &frame.uv, frame.footprint.as_ref().unwrap_or(&frame.uv)]
+        })?;
         Ok(Seen {
             radiance: radiance.into_iter().map(|[_, green, _, _]| green).collect(),
             uv: uv.into_iter().map(|[u, v, _, _]| [u, v]).collect(),

@@ -14,7 +14,7 @@ use std::f64::consts::{PI, SQRT_2};
 /// Operands of one dispatch.
 const AT_ONCE: u32 = 1 << 21;
 /// Operands of each function in a test.
-const QUICK: u64 = 30_000_000;
+const QUICK: u64 = 100_000_000;
 
 /// A function of one word.
 struct Helper {
@@ -46,7 +46,8 @@ pub struct UnaryLine {
     pub inputs: u64,
     /// What the error is.
     pub error_of: String,
-    /// The worst error.
+    /// The worst error; infinite where an answer is no number at all.
+    #[serde(deserialize_with = "crate::number_or_infinity")]
     pub worst: f64,
     /// The operand that it is at.
     pub at: f64,
@@ -86,9 +87,9 @@ fn relative(answer: f64, truth: f64) -> f64 {
 
 const RELATIVE: &str = "|answer / truth - 1|";
 
-/// All of them. A bound that says "fit" is that of a polynomial as published; the others are roundings counted: a unit of
+/// All of them. Where a comment in shaders_glsl/shared states a bound, it is this one. A bound that says "fit" is that of a polynomial as published; the others are roundings counted: a unit of
 /// rounding is 6e-8, and exp, log and division may take 3 + 2 |x|, 3 and 2.5 units in the last place of 1.2e-7 (Vulkan).
-const HELPERS: [Helper; 9] = [
+static HELPERS: [Helper; 9] = [
     Helper {
         name: "log_one_minus",
         domain: "1e-30 <= p <= 1/2",
@@ -212,75 +213,92 @@ const HELPERS: [Helper; 9] = [
     },
 ];
 
-/// Tries every helper; `progress` hears of each that is done. Those that the device cannot run are errors of the device.
-///
-/// # Errors
-/// Those of the device.
-pub fn unary(
-    laboratory: &mut Laboratory,
-    mut progress: impl FnMut(&UnaryLine),
-) -> Result<Vec<UnaryLine>, StabilityError> {
-    let mut lines = Vec::new();
-    for helper in &HELPERS {
+/// A function under trial, many operands at a time: it can be left between any two steps.
+pub struct Trial {
+    helper: &'static Helper,
+    /// From one word to the next.
+    distance: u32,
+    /// Words in all.
+    words: u64,
+    /// Words that were tried.
+    tried: u64,
+    /// The worst error, and its word.
+    worst: (f64, u32),
+}
+
+impl Trial {
+    /// One of each function.
+    pub fn all(effort: Effort) -> Vec<Self> {
+        let new = |helper: &'static Helper| {
+            let all = u64::from(helper.words[1] - helper.words[0]) + 1;
+            let distance = match effort {
+                Effort::Full => 1,
+                // An odd distance meets all patterns of the lower bits.
+                Effort::Quick => (all.div_ceil(QUICK) | 1) as u32,
+            };
+            // The last word is tried whatever the distance: errors like ends.
+            let words = (all - 1).div_ceil(distance.into()) + 1;
+            Self { helper, distance, words, tried: 0, worst: (0.0, helper.words[0]) }
+        };
+        HELPERS.iter().map(new).collect()
+    }
+
+    /// Its name in shaders_glsl/shared.
+    pub fn name(&self) -> &'static str {
+        self.helper.name
+    }
+
+    /// How many operands were tried, and how many there are.
+    pub fn progress(&self) -> [u64; 2] {
+        [self.tried, self.words]
+    }
+
+    /// Tries some more, and says how the function fared once all are tried.
+    ///
+    /// # Errors
+    /// Those of the device, also that it lacks a feature.
+    pub fn step(&mut self, laboratory: &mut Laboratory) -> Result<Option<UnaryLine>, StabilityError> {
+        let Self { helper, distance, words, .. } = *self;
         if helper.needs_int64 && !laboratory.executor.device().has(Feature::Int64) {
             return Err(StabilityError::Missing(format!("{} needs shaderInt64, which this device lacks", helper.name)));
         }
-        let line = tried(laboratory, helper)?;
-        progress(&line);
-        lines.push(line);
-    }
-    Ok(lines)
-}
-
-/// The worst error over the words of a helper's domain.
-fn tried(laboratory: &mut Laboratory, helper: &Helper) -> Result<UnaryLine, StabilityError> {
-    let [first, last] = helper.words;
-    let all = u64::from(last - first) + 1;
-    // An odd distance meets all patterns of the lower bits.
-    let distance = match laboratory.effort {
-        Effort::Full => 1,
-        Effort::Quick => (all.div_ceil(QUICK) | 1) as u32,
-    };
-    let count = all.div_ceil(distance.into());
-    let mut inputs = 0;
-    let mut worst = (0.0, first);
-    // The last word is tried whatever the distance: errors like ends.
-    let starts = (0..count)
-        .step_by(AT_ONCE as usize)
-        .map(|index| (first + (index * u64::from(distance)) as u32, (count - index).min(AT_ONCE.into()) as u32));
-    for (from, words) in starts.chain([(last, 1)]) {
+        let [first, last] = helper.words;
+        // All but the last lie at equal distances.
+        let before_last = words - 1 - self.tried;
+        let (from, count) = match before_last {
+            0 => (last, 1),
+            _ => (first + (self.tried * u64::from(distance)) as u32, before_last.min(AT_ONCE.into()) as u32),
+        };
         let mut graph = Graph::new();
-        let mut answers = graph.buffer("answers", 4 * u64::from(words));
-        (helper.declare)(&mut graph, &mut answers, words, from, distance);
+        let mut answers = graph.buffer("answers", 4 * u64::from(count));
+        (helper.declare)(&mut graph, &mut answers, count, from, distance);
         let download = graph.download(&answers);
         let bytes = laboratory.executor.run(graph, Timing::Overlapped)?.take(download);
-        let found = bytes
-            .par_chunks(1 << 14)
-            .enumerate()
-            .map(|(chunk, bytes)| {
-                let mut worst = (0.0, from);
-                for (index, bytes) in bytes.chunks_exact(4).enumerate() {
-                    let word = from + ((chunk << 12) + index) as u32 * distance;
-                    let answer = f32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
-                    let error = (helper.error)(word, answer.into());
-                    // What is no number is infinitely wrong.
-                    worst = worse(worst, (if error.is_nan() { f64::INFINITY } else { error }, word));
-                }
-                worst
-            })
-            .reduce(|| (0.0, first), worse);
-        worst = worse(worst, found);
-        inputs += u64::from(words);
+        let error_of = |(index, bytes): (usize, &[u8])| {
+            let word = from + index as u32 * distance;
+            let answer = f32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+            let error = (helper.error)(word, answer.into());
+            // What is no number is infinitely wrong.
+            (if error.is_nan() { f64::INFINITY } else { error }, word)
+        };
+        let found = bytes.par_chunks_exact(4).with_min_len(1 << 12).enumerate().map(error_of);
+        self.worst = worse(self.worst, found.reduce(|| (0.0, from), worse));
+        self.tried += u64::from(count);
+        Ok((self.tried == words).then(|| self.line()))
     }
-    Ok(UnaryLine {
-        helper: helper.name.to_owned(),
-        domain: helper.domain.to_owned(),
-        inputs,
-        error_of: helper.error_of.to_owned(),
-        worst: worst.0,
-        at: (helper.operand)(worst.1),
-        bound: helper.bound,
-    })
+
+    fn line(&self) -> UnaryLine {
+        let helper = self.helper;
+        UnaryLine {
+            helper: helper.name.to_owned(),
+            domain: helper.domain.to_owned(),
+            inputs: self.tried,
+            error_of: helper.error_of.to_owned(),
+            worst: self.worst.0,
+            at: (helper.operand)(self.worst.1),
+            bound: helper.bound,
+        }
+    }
 }
 
 /// The larger error, and of two alike that of the smaller word: the same whatever the order of threads.

@@ -4,7 +4,7 @@
 //! below it, moves the structure on, and creates. Instances, devices and their queues and command buffers begin with a
 //! pointer that is the same for all that belong together: the key to what was found.
 
-use crate::{calls, faults, poorer};
+use crate::{calls, faults, moods, poorer};
 use ash::vk::{self, Handle};
 use std::collections::HashMap;
 use std::ffi::{CStr, CString, c_char, c_void};
@@ -253,7 +253,7 @@ pub unsafe extern "system" fn mica_faults_get_device_proc_addr(
     let next = function(device, name)?;
     match name.to_bytes() {
         b"vkGetDeviceProcAddr" | b"vkDestroyDevice" => own(name),
-        _ => calls::function(name).or(Some(next)),
+        _ => moods::function(name).or_else(|| calls::function(name)).or(Some(next)),
     }
 }
 

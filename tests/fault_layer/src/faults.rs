@@ -2,11 +2,13 @@
 
 use ash::vk;
 use std::ffi::{CStr, c_char};
+use std::ops::Range;
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 
-/// Lets the call number `call` from now on, of all that may fail, return the result number `choice` of those that it may
-/// return. There is none where it may return fewer. With a name, which has to live on, only calls of this function count.
-pub type Arm = unsafe extern "C" fn(call: u32, choice: u32, name: *const c_char);
+/// Lets the call number `call` from now on, of all that may fail, and those after it that make `times` of them, return the
+/// result number `choice` of those that each may return. There is none where it may return fewer. With a name, which has to
+/// live on, only calls of this function count.
+pub type Arm = unsafe extern "C" fn(call: u32, times: u32, choice: u32, name: *const c_char);
 
 /// Writes what happened since the last [`Arm`], and lets nothing fail any more.
 pub type ReportOf = unsafe extern "C" fn(report: *mut Report);
@@ -17,7 +19,7 @@ pub type ReportOf = unsafe extern "C" fn(report: *mut Report);
 pub struct Report {
     /// How many calls were made that may fail.
     pub calls: u32,
-    /// How many results the call in question may return beside success; 0 if it was not made.
+    /// How many results the last call in question may return beside success; 0 if none was made.
     pub choices: u32,
     /// What it returned; `SUCCESS` if it did not fail.
     pub result: vk::Result,
@@ -33,11 +35,18 @@ impl Report {
 unsafe impl Send for Report {}
 
 struct State {
-    /// `None` unless the process asks: the call, its choice, and the name of what counts.
-    armed: Option<(u32, u32, Option<&'static CStr>)>,
+    /// `None` unless the process asks.
+    armed: Option<Armed>,
     report: Report,
     /// From the environment, each with the calls of this function so far.
     planned: Vec<(Planned, u32)>,
+}
+
+/// As [`Arm`] says.
+struct Armed {
+    calls: Range<u32>,
+    choice: u32,
+    name: Option<&'static CStr>,
 }
 
 /// One item of `MICA_FAULTS`: a call that fails.
@@ -81,17 +90,18 @@ pub(crate) fn items() -> Vec<String> {
 /// What a call returns instead of being made, if it is its turn. `name` ends with a NUL.
 pub(crate) fn result_of(name: &'static str, may_return: &[vk::Result]) -> Option<vk::Result> {
     let mut state = state();
-    let counts = |only: Option<&CStr>| only.is_none_or(|only| only.to_bytes_with_nul() == name.as_bytes());
-    if let Some((wanted, choice, _)) = state.armed.filter(|(.., only)| counts(*only)) {
-        let call = state.report.calls;
-        state.report.calls += 1;
-        if call != wanted {
+    let State { armed, report, .. } = &mut *state;
+    let counts = |armed: &&Armed| armed.name.is_none_or(|only| only.to_bytes_with_nul() == name.as_bytes());
+    if let Some(armed) = armed.as_ref().filter(counts) {
+        let call = report.calls;
+        report.calls += 1;
+        if !armed.calls.contains(&call) {
             return None;
         }
-        let result = may_return.get(choice as usize).copied();
-        state.report.name = name.as_ptr().cast();
-        state.report.choices = may_return.len() as u32;
-        state.report.result = result.unwrap_or(vk::Result::SUCCESS);
+        let result = may_return.get(armed.choice as usize).copied();
+        report.name = name.as_ptr().cast();
+        report.choices = may_return.len() as u32;
+        report.result = result.unwrap_or(vk::Result::SUCCESS);
         return result;
     }
     let plain = name.trim_end_matches('\0');
@@ -111,11 +121,11 @@ pub(crate) fn result_of(name: &'static str, may_return: &[vk::Result]) -> Option
 /// # Safety
 /// The name is null or a string that lives until the next call of this.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn mica_faults_arm(call: u32, choice: u32, name: *const c_char) {
+pub unsafe extern "C" fn mica_faults_arm(call: u32, times: u32, choice: u32, name: *const c_char) {
     // SAFETY: as the caller promises.
-    let only = (!name.is_null()).then(|| unsafe { CStr::from_ptr(name) });
+    let name = (!name.is_null()).then(|| unsafe { CStr::from_ptr(name) });
     let mut state = state();
-    state.armed = Some((call, choice, only));
+    state.armed = Some(Armed { calls: call..call.saturating_add(times), choice, name });
     state.report = Report::NOTHING;
 }
 

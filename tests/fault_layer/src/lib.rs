@@ -8,12 +8,18 @@
 //!   `@2+` lets every call from that one on fail.
 //! - `maxStorageBufferRange=4096`: a limit of every device; also `timestampValidBits`.
 //! - `without=VK_KHR_ray_query`: devices lack this extension or feature.
+//! - `largestAllocation=4096`: an allocation of more bytes is out of memory.
+//! - `hang=2`: the submission number 2 never begins, and no later one. Waits for it last as long as they may, and those that
+//!   may last for ever do. With `hang=2/60` waits last a sixtieth.
+//! - `clock=back`, `clock=jump`, `clock=wrap`: timestamps run backwards, jump by years after the first of a frame, or
+//!   are those of a counter of 36 bits that wraps just then.
 //!
 //! A process can also ask for one fault after another: [`ARM`] and [`REPORT`] are functions of the library.
 
 mod calls;
 mod chain;
 mod faults;
+mod moods;
 mod poorer;
 
 use std::ffi::OsString;

@@ -104,13 +104,15 @@ pub fn check_kind(error: &Error, happened: &Happened) {
 }
 
 /// Calls whose failure costs nothing that a picture needs: names in messages; the cache of pipelines; extensions of the
-/// device, which are then not used; a wait that is made once more; times.
+/// device, which are then not used; times; a wait that is made once more, and memory that is asked for in a smaller piece.
 fn may_be_ignored(name: &str, result: vk::Result) -> bool {
     let is_of_use_only = [
         "vkSetDebugUtilsObjectNameEXT",
         "vkCreatePipelineCache",
         "vkGetPipelineCacheData",
         "vkEnumerateDeviceExtensionProperties",
+        "vkAllocateMemory",
+        "vkMapMemory",
     ];
     is_of_use_only.contains(&name)
         || matches!(result, vk::Result::INCOMPLETE | vk::Result::NOT_READY)

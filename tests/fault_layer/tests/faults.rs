@@ -35,9 +35,20 @@ impl Faults {
         choice: u32,
         act: impl FnOnce() -> T,
     ) -> (T, Happened) {
+        self.during_some(name, (call, 1), choice, act)
+    }
+
+    /// The same, and so many calls fail, one after another.
+    pub fn during_some<T>(
+        &self,
+        name: Option<&'static CStr>,
+        (call, times): (u32, u32),
+        choice: u32,
+        act: impl FnOnce() -> T,
+    ) -> (T, Happened) {
         let of = name.map_or(std::ptr::null(), CStr::as_ptr);
         // SAFETY: the symbols are of these types.
-        unsafe { self.library.get::<Arm>(ARM).expect("a symbol")(call, choice, of) };
+        unsafe { self.library.get::<Arm>(ARM).expect("a symbol")(call, times, choice, of) };
         let done = act();
         let mut report = MaybeUninit::<Report>::uninit();
         // SAFETY: as above; the function writes the whole report, and names are literals of a library that stays open.

@@ -1,6 +1,8 @@
 //! A hundred thousand mutated files of every format, in bounded memory: none panics, aborts or hangs.
 
+use mica_fuzz::Format;
 use std::io::Write;
+use std::path::Path;
 use std::process::Command;
 
 /// The program, with what it says.
@@ -21,6 +23,19 @@ fn a_hundred_thousand_mutated_files_of_each_format_do_no_harm() {
     assert!(ok, "{said}");
     assert!(said.contains("100,000 inputs each of gltf, glb, exr, hdr, png, jpeg, cache: no panic, abort or hang"));
     std::fs::remove_dir(out).expect("nothing failed, so nothing was written");
+}
+
+/// Building them takes a tree of its own, so that a run of tests only looks at them.
+#[test]
+fn every_format_has_a_target_for_cargo_fuzz() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz");
+    let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).expect("a manifest");
+    assert_eq!(manifest.matches("[[bin]]").count(), Format::ALL.len());
+    for name in Format::ALL.map(Format::name) {
+        assert!(manifest.contains(&format!("name = \"{name}\"\npath = \"fuzz_targets/{name}.rs\"")), "{name}");
+        let target = std::fs::read_to_string(folder.join(format!("fuzz_targets/{name}.rs"))).expect("a target");
+        assert!(target.contains(&format!("mica_fuzz::{name}(bytes)")), "{name}: {target}");
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Settings as they are typed: `KEY=VALUE`, for all glinting materials or for one.
 
-use mica_render::{COMMON_SETTINGS, GlintMaterial, METHODS, Renderer, Setting, SettingError, method};
+use mica_render::{COMMON_SETTINGS, GlintMaterial, METHODS, Renderer, Setting, SettingError, check_method};
 
 /// The key that stands for the method itself.
 const METHOD: &str = "method";
@@ -51,7 +51,7 @@ impl Change {
             return Err(SettingError::NoMaterial { name: name.clone(), known });
         }
         if self.key == METHOD {
-            return method(&self.value).map(|_| ());
+            return check_method(&self.value);
         }
         let settings: Vec<&Setting> =
             COMMON_SETTINGS.iter().chain(METHODS.iter().flat_map(|method| method.settings)).collect();

@@ -37,28 +37,44 @@ pub fn choose(
     Ok(ChosenEnvironment { name, environment })
 }
 
-fn of_command_line(asked: &Path, progress: &mut Progress) -> Result<Option<EquirectMap>, Failure> {
+/// What `--env` names; none for `none`.
+pub fn of_command_line(asked: &Path, progress: &mut Progress) -> Result<Option<EquirectMap>, Failure> {
     let text = asked.to_str().unwrap_or_default();
     if text == "none" {
         return Ok(None);
     }
     if let Some(rgb) = text.strip_prefix("constant:") {
-        let radiance = numbers(rgb).and_then(power).ok_or_else(|| {
-            Failure::bad_input(format!("--env {text}: expected constant:R,G,B, each a number from 0 to 1e12"))
-        })?;
-        return Ok(Some(EquirectMap::constant(radiance)));
+        return constant(rgb).map(Some);
     }
     if let Some(map) = procedural::environment(text) {
         return Ok(Some(map));
     }
-    if asked.extension().is_none() && !asked.exists() {
-        return Err(Failure::bad_input(format!(
-            "no environment `{}`: there are {}, none and constant:R,G,B; or give the path of an .exr or .hdr file",
-            asked.display(),
-            names()
-        )));
-    }
+    check(asked)?;
     from_file(asked, progress).map(Some)
+}
+
+/// Whether `--env` names something: what the file holds is seen when it is read.
+pub fn check(asked: &Path) -> Result<(), Failure> {
+    let text = asked.to_str().unwrap_or_default();
+    if let Some(rgb) = text.strip_prefix("constant:") {
+        return constant(rgb).map(|_| ());
+    }
+    let is_name = text == "none" || procedural::NAMES.iter().any(|(name, _)| *name == text);
+    if is_name || asked.extension().is_some() || asked.exists() {
+        return Ok(());
+    }
+    Err(Failure::bad_input(format!(
+        "no environment `{}`: there are {}, none and constant:R,G,B; or give the path of an .exr or .hdr file",
+        asked.display(),
+        names()
+    )))
+}
+
+fn constant(rgb: &str) -> Result<EquirectMap, Failure> {
+    let radiance = numbers(rgb).and_then(power).ok_or_else(|| {
+        Failure::bad_input(format!("--env constant:{rgb}: expected constant:R,G,B, each a number from 0 to 1e12"))
+    })?;
+    Ok(EquirectMap::constant(radiance))
 }
 
 /// What the scene's file asks for: a name, or a file in the scene's own folder or below it.

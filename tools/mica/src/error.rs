@@ -21,18 +21,20 @@ pub const INTERRUPTED: u8 = 130;
 pub struct Failure {
     /// The exit code.
     pub code: u8,
+    /// Whether a device was lost: another one may serve.
+    pub device_lost: bool,
     message: String,
 }
 
 impl Failure {
     /// Something that the user gave cannot be used.
     pub fn bad_input(message: impl Into<String>) -> Self {
-        Self { code: BAD_INPUT, message: message.into() }
+        Self::with_code(BAD_INPUT, message)
     }
 
     /// A failure with a code of its own.
     pub fn with_code(code: u8, message: impl Into<String>) -> Self {
-        Self { code, message: message.into() }
+        Self { code, device_lost: false, message: message.into() }
     }
 }
 
@@ -58,6 +60,7 @@ impl From<SettingError> for Failure {
 impl From<mica_gpu::Error> for Failure {
     fn from(error: mica_gpu::Error) -> Self {
         let code = u8::try_from(error.exit_code()).unwrap_or(NO_DEVICE);
+        let device_lost = matches!(error, mica_gpu::Error::DeviceLost { .. });
         let message = match error {
             // The library cannot know how its host lets the limit be raised.
             mica_gpu::Error::MemoryLimit { what, bytes, used, limit } => format!(
@@ -68,7 +71,7 @@ impl From<mica_gpu::Error> for Failure {
             }
             error => error.to_string(),
         };
-        Self::with_code(code, message)
+        Self { device_lost, ..Self::with_code(code, message) }
     }
 }
 

@@ -149,9 +149,18 @@ pub fn median(values: &[u64]) -> Option<u64> {
 
 /// Whether a pass is part of what glints cost in every frame.
 pub fn is_of_glints(pass: &str) -> bool {
-    pass.starts_with("glints")
-        || pass.starts_with("blur_")
-        || ["clear specular_layer", "occlusion", "composite"].contains(&pass)
+    const PASSES: [&str; 9] = [
+        "upload tile_lists",
+        "glint_tiles",
+        "layer_tiles",
+        "clear specular_layer",
+        "clear glints_blurred",
+        "clear visibility",
+        "clear visibility_blurred",
+        "occlusion",
+        "composite",
+    ];
+    pass.starts_with("glints") || pass.starts_with("blur_") || PASSES.contains(&pass)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use crate::error::Failure;
 use crate::output;
 use crate::report;
 use crate::table::{Column, table};
-use mica_render::{COMMON_SETTINGS, DEFAULT_METHOD, Kind, METHODS, MethodInfo, Setting};
+use mica_render::{AUTO_METHOD, COMMON_SETTINGS, DEFAULT_METHOD, Kind, METHODS, MethodInfo, Setting};
 use serde_json::{Map, Value as Json, json};
 
 /// Prints all methods.
@@ -36,6 +36,7 @@ pub fn methods(args: &JsonFlag) -> Result<(), Failure> {
         }
         text.push('\n');
     }
+    text += &format!("{AUTO_METHOD}: chooses one for each material, by what the scene holds (see `mica explain`)\n\n");
     text += &format!("every method\n\n{}", indented(&settings_table(COMMON_SETTINGS)));
     text += "\nSet with --set KEY=VALUE, or for one material with --glint MATERIAL:KEY=VALUE.\n";
     output::print(&text)

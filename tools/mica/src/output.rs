@@ -4,19 +4,27 @@ use crate::error::Failure;
 use signal_hook::consts::SIGXFSZ;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
+use std::os::fd::AsFd;
 use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Prints to stdout. A reader that has seen enough is no failure.
+/// Prints to stdout. A reader that has seen enough is no failure, nor is a terminal that was closed.
 pub fn print(text: &str) -> Result<(), Failure> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe && !is_closed_terminal(&error) => {
             Err(Failure::bad_input(format!("stdout cannot be written: {error}")))
         }
         _ => Ok(()),
     }
+}
+
+/// Whether a write failed because the terminal is gone: then it is no terminal any more, but still a device.
+fn is_closed_terminal(error: &io::Error) -> bool {
+    const EIO: i32 = 5;
+    let device = || File::from(io::stdout().as_fd().try_clone_to_owned().ok()?).metadata().ok();
+    error.raw_os_error() == Some(EIO) && device().is_some_and(|device| device.file_type().is_char_device())
 }
 
 /// Prints a report as indented JSON.

@@ -2,7 +2,7 @@
 
 use crate::args::{RenderArgs, TimingChoice};
 use crate::budget::{self, BudgetReport};
-use crate::change::Change;
+use crate::edit::Edit;
 use crate::error::{Failure, INTERRUPTED};
 use crate::interrupt::Interrupt;
 use crate::measure::{self, Measurements, PassRow, PassSum};
@@ -11,42 +11,30 @@ use crate::picture::Picture;
 use crate::progress::Progress;
 use crate::report::{
     CameraReport, DeviceReport, EnvironmentReport, FrameCounts, FrameTimes, LeftOutReport, MemoryReport, RaysReport,
-    RenderReport, SCHEMA, UpdateReport, settings,
+    RenderReport, SCHEMA, StartReport, UpdateReport, settings,
 };
 use crate::report_text;
 use crate::session::{Session, Shot};
+use crate::spare::Spare;
 use mica_gpu::Timing;
+use mica_render::Update;
 use std::path::Path;
+use std::time::Instant;
 
 /// Fewest frames before the first that is measured.
 const LEAST_WARMUP: u32 = 2;
 
 /// Renders, measures, writes and prints.
 pub fn render(args: &RenderArgs, interrupt: &Interrupt) -> Result<(), Failure> {
+    let started = Instant::now();
     let outputs = Outputs::check(args)?;
     let mut progress = Progress::new(args.quiet);
-    let (mut session, budget) = match args.budget.wish() {
-        Some(wish) => {
-            let (session, report) = budget::choose_for(&args.scene, &wish, interrupt, &mut progress)?;
-            (session, Some(report))
-        }
-        None => (Session::new(&args.scene, &mut progress)?, None),
-    };
-    for edit in &args.edit {
-        edit.check(session.renderer.materials())?;
-    }
-
-    let mut updates = Vec::new();
-    let mut work = Work { session: &mut session, interrupt, progress: &mut progress, frames: 0 };
-    work.update(0, None, &mut updates)?;
-    for (frame, edit) in (1..).zip(&args.edit) {
-        edit.apply(&mut work.session.renderer)?;
-        work.update(frame, Some(edit), &mut updates)?;
-    }
-    let (shot, samples) = work.picture(args.samples)?;
-    let warmup = work.warm_up(args)?;
-    let measurements = work.measure(args)?;
+    let made = match Made::new(args, interrupt, &mut progress, started) {
+        Err(failure) if Spare::default().serves(&failure) => Made::new(args, interrupt, &mut progress, started),
+        made => made,
+    }?;
     progress.clear();
+    let Made { session, budget, updates, start, shot, samples, warmup, measurements } = made;
 
     let Shot { picture: Some(picture), .. } = &shot else {
         return Err(Failure::bad_input("the frame gave no picture"));
@@ -61,6 +49,7 @@ pub fn render(args: &RenderArgs, interrupt: &Interrupt) -> Result<(), Failure> {
             warmup,
             measurements: &measurements,
             updates: &updates,
+            start,
             interrupted: interrupt.requested(),
         },
         budget,
@@ -89,6 +78,50 @@ pub fn render(args: &RenderArgs, interrupt: &Interrupt) -> Result<(), Failure> {
         return Err(Failure::with_code(INTERRUPTED, format!("interrupted after {samples}, which were kept")));
     }
     Ok(())
+}
+
+/// All that is rendered, and on what.
+struct Made {
+    session: Session,
+    budget: Option<BudgetReport>,
+    updates: Vec<UpdateReport>,
+    start: StartReport,
+    shot: Shot,
+    samples: u32,
+    warmup: u32,
+    measurements: Measurements,
+}
+
+impl Made {
+    fn new(
+        args: &RenderArgs,
+        interrupt: &Interrupt,
+        progress: &mut Progress,
+        started: Instant,
+    ) -> Result<Self, Failure> {
+        let (mut session, budget) = match args.budget.wish() {
+            Some(wish) => {
+                let (session, report) = budget::choose_for(&args.scene, &wish, interrupt, progress)?;
+                (session, Some(report))
+            }
+            None => (Session::new(&args.scene, progress)?, None),
+        };
+        for edit in &args.edit {
+            edit.check(&session)?;
+        }
+        let mut work = Work { session: &mut session, interrupt, progress, frames: 0, updates: Vec::new() };
+        work.update(None)?;
+        let start = StartReport::new(started.elapsed(), work.session.executor.pipelines());
+        for edit in &args.edit {
+            edit.apply(work.session, work.progress)?;
+            work.update(Some(edit))?;
+        }
+        let (shot, samples) = work.picture(args.samples)?;
+        let warmup = work.warm_up(args)?;
+        let measurements = work.measure(args)?;
+        let updates = work.updates;
+        Ok(Self { session, budget, updates, start, shot, samples, warmup, measurements })
+    }
 }
 
 /// How a picture is written.
@@ -144,26 +177,43 @@ struct Work<'a> {
     progress: &'a mut Progress,
     /// How many were made so far.
     frames: u32,
+    /// What they brought up to date.
+    updates: Vec<UpdateReport>,
 }
 
 impl Work<'_> {
     fn frame(&mut self, sample: Option<u32>, timing: Timing, picture: bool) -> Result<Shot, Failure> {
-        self.frames += 1;
-        self.session.frame(sample, timing, picture)
+        let shot = self.session.frame(sample, timing, picture)?;
+        self.note(&shot, None);
+        Ok(shot)
     }
 
-    /// Makes a frame after a change, and notes what it brought up to date.
-    fn update(&mut self, frame: usize, edit: Option<&Change>, updates: &mut Vec<UpdateReport>) -> Result<(), Failure> {
-        let edit = edit.map(Change::to_string);
-        let note = |pass, why, runs, ns| UpdateReport { pass, why, runs, ns, frame, edit: edit.clone() };
+    /// Makes the first frame, or one after an edit.
+    fn update(&mut self, edit: Option<&Edit>) -> Result<(), Failure> {
         let precomputed = self.session.precompute(self.progress)?;
-        updates.extend(precomputed.into_iter().map(|update| note(update.pass, update.why, 1, Some(update.ns))));
-        self.frames += 1;
+        let (frame, typed) = (self.frames as usize, edit.map(Edit::to_string));
+        self.updates.extend(precomputed.into_iter().map(|Update { pass, why, ns }| UpdateReport {
+            pass,
+            why,
+            runs: 1,
+            ns: Some(ns),
+            frame,
+            edit: typed.clone(),
+        }));
         let session = &mut self.session;
         let shot = self.progress.during("building tables", || session.frame(None, Timing::Isolated, false))?;
-        let sums = measure::sums(&shot, true).into_iter();
-        updates.extend(sums.map(|PassSum { name, why, runs, ns }| note(name, why, runs, ns)));
+        self.note(&shot, edit);
         Ok(())
+    }
+
+    /// Notes what a frame brought up to date: nothing, where nothing was edited.
+    fn note(&mut self, shot: &Shot, edit: Option<&Edit>) {
+        let (frame, edit) = (self.frames as usize, edit.map(Edit::to_string));
+        let sums = measure::sums(shot, true).into_iter();
+        let noted =
+            |PassSum { name, why, runs, ns }| UpdateReport { pass: name, why, runs, ns, frame, edit: edit.clone() };
+        self.updates.extend(sums.map(noted));
+        self.frames += 1;
     }
 
     /// The picture as the mean of so many samples, fewer after Ctrl-C; and how many there are in it.
@@ -225,6 +275,7 @@ struct Outcome<'a> {
     warmup: u32,
     measurements: &'a Measurements,
     updates: &'a [UpdateReport],
+    start: StartReport,
     interrupted: bool,
 }
 
@@ -242,6 +293,7 @@ fn report(session: &Session, outcome: &Outcome, budget: Option<BudgetReport>) ->
     passes.extend(every_frame);
     let validation = args
         .scene
+        .device
         .validation
         .then(|| session.executor.device().take_messages().iter().map(ToString::to_string).collect());
     RenderReport {
@@ -257,7 +309,7 @@ fn report(session: &Session, outcome: &Outcome, budget: Option<BudgetReport>) ->
             name: session.environment.clone(),
             rotation_deg: session.environment_rotation_deg,
         },
-        lights: session.renderer.scene().lights.len() + args.scene.light.len(),
+        lights: session.lights.len(),
         device: DeviceReport::new(session.device()),
         occlusion: session.renderer.occlusion().name(),
         occlusion_why: session.occlusion_why.clone(),
@@ -271,7 +323,9 @@ fn report(session: &Session, outcome: &Outcome, budget: Option<BudgetReport>) ->
         glint_ns,
         rays,
         memory: session.executor.memory().into_iter().map(MemoryReport::new).collect(),
+        edits: args.edit.iter().map(Edit::to_string).collect(),
         updates: outcome.updates.to_vec(),
+        start: outcome.start,
         image: outcome.picture.summary(),
         left_out: shot.left_out.iter().map(LeftOutReport::new).collect(),
         validation,

@@ -3,11 +3,12 @@
 use crate::budget::BudgetReport;
 use crate::measure::{PassRow, TracedRays};
 use crate::picture::ImageSummary;
-use mica_gpu::{DeviceInfo, MemoryRow};
+use mica_gpu::{DeviceInfo, MemoryRow, PipelinesMade};
 use mica_render::scene::Camera;
 use mica_render::{GlintMaterial, LeftOut, Value};
 use serde::Serialize;
 use serde_json::{Map, Value as Json};
+use std::time::Duration;
 
 /// Names this form of the report; it changes when a field changes its meaning or goes.
 pub const SCHEMA: &str = "mica-render-1";
@@ -29,7 +30,7 @@ pub struct RenderReport {
     pub samples: u32,
     pub camera: CameraReport,
     pub environment: EnvironmentReport,
-    /// Lights of the scene and of the command line.
+    /// Lights that shine in the picture.
     pub lights: usize,
     pub device: DeviceReport,
     /// Who answered what blocks light.
@@ -44,7 +45,10 @@ pub struct RenderReport {
     /// By pass.
     pub rays: Vec<RaysReport>,
     pub memory: Vec<MemoryReport>,
+    /// As typed: the first comes before frame 1.
+    pub edits: Vec<String>,
     pub updates: Vec<UpdateReport>,
+    pub start: StartReport,
     pub image: ImageSummary,
     pub left_out: Vec<LeftOutReport>,
     /// What the validation layer said; absent without `--validation`.
@@ -161,6 +165,23 @@ impl MemoryReport {
     }
 }
 
+/// How the first frame came to be.
+#[derive(Clone, Copy, Serialize)]
+pub struct StartReport {
+    /// From the start of the command to the end of the first frame, with loading, tables and pipelines.
+    pub first_frame_ns: u64,
+    /// Pipelines that it was made with: those of its plan and no others.
+    pub pipelines: usize,
+    /// How long making them took.
+    pub pipelines_ns: u64,
+}
+
+impl StartReport {
+    pub fn new(elapsed: Duration, PipelinesMade { count, ns }: PipelinesMade) -> Self {
+        Self { first_frame_ns: elapsed.as_nanos() as u64, pipelines: count, pipelines_ns: ns }
+    }
+}
+
 /// Work that brought a table up to date.
 #[derive(Clone, Serialize)]
 pub struct UpdateReport {
@@ -168,9 +189,9 @@ pub struct UpdateReport {
     pub why: String,
     pub runs: usize,
     pub ns: Option<u64>,
-    /// 0 for the first frame, then the number of the edit, from 1.
+    /// 0 for the first frame, then the number of the edit, from 1; frames without an edit come after these.
     pub frame: usize,
-    /// What was changed before that frame.
+    /// What was edited before that frame.
     pub edit: Option<String>,
 }
 

@@ -93,9 +93,31 @@ pub fn on_loader<T: Send + 'static>(
 mod tests {
     use super::*;
 
+    fn panicking() -> Result<(), Failure> {
+        on_loader("x.glb", &mut Progress::new(true), || -> Result<(), SceneError> { panic!("injected") })
+    }
+
     #[test]
-    fn a_panic_of_the_loader_is_a_failure() {
-        let result = on_loader("x.glb", &mut Progress::new(true), || -> Result<(), SceneError> { panic!("a bug") });
-        assert!(result.is_err_and(|failure| failure.code == crate::error::BAD_INPUT));
+    fn f43_a_panic_of_the_loader_is_a_failure_and_nothing_waits_for_it() {
+        let failure = panicking().expect_err("it panicked");
+        assert_eq!(failure.code, crate::error::BAD_INPUT);
+        assert!(failure.to_string().contains("x.glb: the loader gave up on it"), "{failure}");
+    }
+
+    #[test]
+    #[ignore = "is run alone by the test below, as it changes what the process says of panics"]
+    fn panic_as_the_program_does() {
+        crate::quiet_loader_panics();
+        assert!(panicking().is_err());
+        assert!(!reads(), "it is over");
+    }
+
+    #[test]
+    fn f43_a_panic_of_the_loader_says_nothing_itself() {
+        let program = std::env::current_exe().expect("this program");
+        let alone = ["--exact", "--ignored", "--nocapture", "scene_choice::tests::panic_as_the_program_does"];
+        let output = std::process::Command::new(program).args(alone).output().expect("it starts");
+        assert!(output.status.success() && String::from_utf8_lossy(&output.stdout).contains("1 passed"), "{output:?}");
+        assert_eq!(String::from_utf8_lossy(&output.stderr), "");
     }
 }

@@ -1,6 +1,6 @@
 //! A scene on a device, set up as the command line says, and the frames that are made of it.
 
-use crate::args::{CameraChoice, SceneArgs};
+use crate::args::{CameraChoice, DeviceArgs, SceneArgs};
 use crate::environment_choice::{self, ChosenEnvironment};
 use crate::error::Failure;
 use crate::measure::{self, TracedRays};
@@ -10,10 +10,9 @@ use crate::progress::Progress;
 use crate::scene_choice::{self, ChosenScene};
 use mica_gpu::{Device, DeviceInfo, DeviceKind, DeviceOptions, Executor, ExecutorOptions, Run, Timing, Validation};
 use mica_graph::{Graph, Plan, Shader};
-use mica_render::scene::Camera;
-use mica_render::{Cache, Frame, LeftOut, Renderer, Update, View, method};
+use mica_render::scene::{Camera, Light};
+use mica_render::{Cache, Frame, LeftOut, Renderer, Update, View, check_method};
 use mica_shaders::types::RayCounts;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -25,6 +24,8 @@ pub struct Session {
     pub environment: String,
     /// How far it is turned, in degrees.
     pub environment_rotation_deg: f64,
+    /// The scene's lights and the command line's.
+    pub lights: Vec<Light>,
     /// Why occlusion is answered as it is.
     pub occlusion_why: String,
     /// The scene, prepared.
@@ -66,7 +67,7 @@ pub struct Wanted {
 pub struct Surface {
     /// The instance, counted from 1, and its triangle; 0 where nothing is.
     pub ids: Vec<[u32; 2]>,
-    /// Derivatives of the flakes' texture coordinates over the pixel: du/dx, dv/dx, du/dy, dv/dy.
+    /// Derivatives of the flakes' texture coordinates over the pixel: du/dx, dv/dx, du/dy, dv/dy; 0 where nothing glints.
     pub footprint: Vec<[f32; 4]>,
 }
 
@@ -113,7 +114,7 @@ impl Loaded {
     /// Loads the scene and its environment.
     pub fn new(args: &SceneArgs, progress: &mut Progress) -> Result<Self, Failure> {
         if let Some(name) = &args.method {
-            method(name)?;
+            check_method(name)?;
         }
         let mut chosen = scene_choice::load(&args.scene, progress)?;
         if args.no_lights {
@@ -149,15 +150,14 @@ impl Session {
 
         let device = match &earlier {
             Some(executor) => executor.device().clone(),
-            None => {
-                Device::new(&DeviceOptions { select: args.device.clone(), validation: validation(args.validation) })?
-            }
+            None => self::device(&args.device)?,
         };
         check_size(args.size, device.info())?;
         let triangles = chosen.scene.meshes.iter().map(|mesh| mesh.triangle_count() as u64).sum();
         let occlusion = occlusion_choice::choose(args.occlusion, device.info(), triangles)?;
 
         let ChosenScene { name, scene, .. } = chosen;
+        let lights = scene.lights.iter().chain(&args.light).copied().collect();
         let mut renderer = Renderer::new(scene, &args.light, environment.environment.as_ref(), occlusion.backend)?;
         for change in args.set.iter().chain(&args.glint) {
             change.check(renderer.materials())?;
@@ -172,15 +172,16 @@ impl Session {
             log::warn!("{name}: no material glints (none has glint_count in its extras): settings have no effect");
         }
 
-        let cache = cache(args.cache.as_deref(), args.no_cache);
+        let cache = cache(&args.device);
         let executor = match earlier {
             Some(executor) => executor,
-            None => executor(device, cache.as_ref(), args.memory)?,
+            None => executor(device, cache.as_ref(), args.device.memory)?,
         };
         Ok(Self {
             scene: name,
             environment: environment.name,
             environment_rotation_deg: args.env_rotate,
+            lights,
             occlusion_why: occlusion.why,
             renderer,
             executor,
@@ -274,7 +275,10 @@ impl Session {
         let Declared { graph: g, frame, .. } = &mut declared;
         let size = [frame.radiance.extent().width, frame.radiance.extent().height];
         let pictures = wanted.picture.then(|| (g.download_image(&frame.radiance), g.download_image(&frame.display)));
-        let surfaces = wanted.surface.then(|| (g.download_image(&frame.ids), g.download_image(&frame.footprint)));
+        let surfaces = wanted.surface.then(|| {
+            let footprint = frame.footprint.as_ref().map(|footprint| g.download_image(footprint));
+            (g.download_image(&frame.ids), footprint)
+        });
         let counts: Vec<_> =
             frame.rays.iter().filter(|_| wanted.picture).map(|of| (of.pass, g.download(&of.counts))).collect();
         let mut run = self.executor.run(std::mem::take(g), timing)?;
@@ -285,7 +289,10 @@ impl Session {
         });
         let surface = surfaces.map(|(ids, footprint)| Surface {
             ids: bytemuck::pod_collect_to_vec(&run.take(ids)),
-            footprint: bytemuck::pod_collect_to_vec(&run.take(footprint)),
+            footprint: match footprint {
+                Some(footprint) => bytemuck::pod_collect_to_vec(&run.take(footprint)),
+                None => vec![[0.0; 4]; (size[0] * size[1]) as usize],
+            },
         });
         let counts = counts.into_iter().map(|(pass, download)| (pass, run.take(download)));
         let counts = counts.map(|(pass, bytes)| (pass, bytemuck::pod_read_unaligned::<RayCounts>(&bytes)));
@@ -300,19 +307,22 @@ fn floats(bytes: &[u8]) -> Vec<f32> {
     bytes.as_chunks().0.iter().map(|word| f32::from_ne_bytes(*word)).collect()
 }
 
-fn camera(choice: CameraChoice) -> Camera {
+/// The camera that was asked for.
+pub fn camera(choice: CameraChoice) -> Camera {
     let CameraChoice { eye, target, vertical_fov_deg } = choice;
     // Depth is reversed and a float, so a near plane this close costs nothing.
     let near = 1e-6 * eye.distance(target).min(100.0);
     Camera::looking_at("command line", eye, target, vertical_fov_deg.to_radians(), near)
 }
 
-/// What `--validation` asks for.
-pub fn validation(asked: bool) -> Validation {
-    if asked { Validation::Synchronization } else { Validation::Off }
+/// The device that is asked for.
+pub fn device(args: &DeviceArgs) -> Result<Arc<Device>, Failure> {
+    let validation = if args.validation { Validation::Synchronization } else { Validation::Off };
+    Ok(Device::new(&DeviceOptions { select: args.device.clone(), validation })?)
 }
 
-fn check_size(size: [u32; 2], device: &DeviceInfo) -> Result<(), Failure> {
+/// Whether a device holds pictures of this size.
+pub fn check_size(size: [u32; 2], device: &DeviceInfo) -> Result<(), Failure> {
     let most = device.limits.max_image_side_2d;
     if size.into_iter().all(|side| side <= most) {
         return Ok(());
@@ -322,8 +332,8 @@ fn check_size(size: [u32; 2], device: &DeviceInfo) -> Result<(), Failure> {
 }
 
 /// Where tables and pipelines are kept, if they are.
-pub fn cache(folder: Option<&Path>, none: bool) -> Option<Cache> {
-    match (folder, none) {
+pub fn cache(args: &DeviceArgs) -> Option<Cache> {
+    match (&args.cache, args.no_cache) {
         (_, true) => None,
         (Some(folder), false) => Some(Cache::new(folder)),
         (None, false) => Cache::of_user(),

@@ -77,6 +77,8 @@ pub fn shade(
     frame: &Frame,
     glints: &mut Image,
 ) {
+    // Where nothing glints there is nothing to shade.
+    let Some(footprint) = &frame.footprint else { return };
     let extent = glints.extent();
     let params = environment_moments::Params {
         alpha: condition.alpha as f32,
@@ -94,7 +96,7 @@ pub fn shade(
         position: &frame.position,
         normal: &frame.normal,
         uv: &frame.uv,
-        footprint: &frame.footprint,
+        footprint,
         specular: &frame.specular,
         // Nothing is read from it without lights.
         shadow_mask: frame.shadow_mask.as_ref().unwrap_or(&frame.ids),

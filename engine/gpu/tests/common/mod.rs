@@ -4,7 +4,7 @@
 pub mod host;
 
 use mica_gpu::{Device, DeviceOptions, Executor, ExecutorOptions, Feature, Messages, Validation};
-use mica_graph::{Access, Binding, BindingKind, Resource, Shader, Slot, Stage, StageCode, Stages, Use};
+use mica_graph::{Access, Binding, BindingKind, Effects, Resource, Shader, Slot, Stage, StageCode, Stages, Use};
 use std::io::Write;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -76,7 +76,16 @@ pub fn compute(
 ) -> &'static Shader {
     let stages = vec![StageCode { stage: Stage::Compute, spirv: compile(glsl, "comp") }];
     let bindings = bindings_of(bindings, Stages::COMPUTE);
-    leak(Shader { name, variant: "", stages: stages.leak(), group, bindings, params_bytes, outputs: &[] })
+    leak(Shader {
+        name,
+        variant: "",
+        stages: stages.leak(),
+        group,
+        bindings,
+        params_bytes,
+        outputs: &[],
+        effects: Effects::NONE,
+    })
 }
 
 /// A vertex and a fragment shader.
@@ -92,7 +101,16 @@ pub fn raster(
         StageCode { stage: Stage::Fragment, spirv: compile(fragment, "frag") },
     ];
     let bindings = bindings_of(bindings, Stages::VERTEX | Stages::FRAGMENT);
-    leak(Shader { name, variant: "", stages: stages.leak(), group: [1; 3], bindings, params_bytes, outputs })
+    leak(Shader {
+        name,
+        variant: "",
+        stages: stages.leak(),
+        group: [1; 3],
+        bindings,
+        params_bytes,
+        outputs,
+        effects: Effects::NONE,
+    })
 }
 
 fn bindings_of(bindings: &[BindingOf], stages: Stages) -> &'static [Binding] {

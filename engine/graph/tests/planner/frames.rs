@@ -3,8 +3,8 @@
 use crate::random::{Random, mix, mix_name};
 use crate::shaders::{COMPUTE, RASTER};
 use mica_graph::{
-    Access, Buffer, Description, Download, Draw, Extent, Format, Graph, Image, ImageDesc, Lifetime, Pass, Plan,
-    Requirements, Resource, ResourceId, Slot, Stages, Use, Work,
+    Access, Buffer, Description, Download, Draw, Effects, Extent, Format, Graph, Image, ImageDesc, Lifetime, Pass,
+    Plan, Requirements, Resource, ResourceId, Slot, Stages, Use, Work,
 };
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -137,7 +137,7 @@ impl Writer {
             self.defined.insert(used.resource.id);
             self.recent.push(used.resource.id);
         }
-        frame.passes.push(Pass { name, why: String::new(), work, uses: uses.0 });
+        frame.passes.push(Pass { name, why: String::new(), work, uses: uses.0, effects: Effects::NONE });
     }
 
     fn compute(&mut self, frame: &Frame, uses: &mut Uses, random: &mut Random) -> (&'static str, Work) {

@@ -1,6 +1,6 @@
 //! Shaders without code: what a planner sees of them.
 
-use mica_graph::{Access, Bind, Buffer, Image, Resource, Shader, Slot, Stages};
+use mica_graph::{Access, Bind, Buffer, Effects, Image, Resource, Shader, Slot, Stages};
 use std::sync::Arc;
 
 /// Stands for every compute shader.
@@ -9,7 +9,16 @@ pub static COMPUTE: Shader = shader("compute", [8, 8, 1]);
 pub static RASTER: Shader = shader("raster", [1, 1, 1]);
 
 const fn shader(name: &'static str, group: [u32; 3]) -> Shader {
-    Shader { name, variant: "", stages: &[], group, bindings: &[], params_bytes: 0, outputs: &[] }
+    Shader {
+        name,
+        variant: "",
+        stages: &[],
+        group,
+        bindings: &[],
+        params_bytes: 0,
+        outputs: &[],
+        effects: Effects::NONE,
+    }
 }
 
 /// A compute shader's images.

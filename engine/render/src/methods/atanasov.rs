@@ -33,8 +33,7 @@
 //!
 //! Needs shaderInt64.
 
-use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints, leaf_level};
-use crate::environment_tables::EnvironmentTables;
+use super::{Claim, GlintMaterial, Method, MethodInfo, Reads, Rung, Shading, bind_glints, leaf_level};
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Graph, Image};
 use mica_shaders::glints::atanasov::{Bind, Params};
@@ -92,7 +91,9 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 pub(crate) struct Atanasov;
 
 impl Method for Atanasov {
-    fn update(&mut self, _g: &mut Graph, _material: &GlintMaterial, _environment: &mut EnvironmentTables) {}
+    fn reads(&self) -> Reads {
+        Reads::Map
+    }
 
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
         let values = &material.values;
@@ -113,7 +114,7 @@ impl Method for Atanasov {
             blend_to: values.number("blend_max") as f32,
             samples: values.number("samples") as u32,
         };
-        let bind = bind_glints!(Bind, shading, glints, environment: shading.environment);
-        g.pass(bind, params, shading.gbuffer.ids.extent());
+        let bind = bind_glints!(Bind, shading, glints, environment: shading.environment.map());
+        shading.pass(g, bind, params, material);
     }
 }

@@ -29,7 +29,7 @@
 //! `microfacet_roughness` sets R as printed instead. Flakes are as dense everywhere; the published shader multiplies
 //! the density by exp(2 z), which `density_randomization=2` does with the mean density that `count` says.
 
-use super::lobe::SmoothEnvironment;
+use super::shared::Shared;
 use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
@@ -89,9 +89,8 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 /// The method at work.
 #[derive(Default)]
 pub(crate) struct DeliotBelcour {
-    environment: SmoothEnvironment,
     /// The same for all materials and settings.
-    noise: Option<Buffer>,
+    noise: Shared<(), Buffer>,
 }
 
 /// The greatest value of Beckmann's D: beyond alpha^2 = 1/2 it is not at the normal.
@@ -116,20 +115,24 @@ fn normals(alpha: f64) -> f64 {
 }
 
 impl Method for DeliotBelcour {
-    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables) {
-        self.environment.update(g, material, environment);
-        if self.noise.is_none() {
-            g.because("the noise map of Deliot and Belcour 2023; first frame");
-            let bytes = 16 * u64::from(DELIOT_BELCOUR_NOISE_SIZE).pow(2);
-            let mut noise = Buffer::new("deliot_belcour_noise", bytes, Lifetime::Scene);
-            let bind = deliot_belcour_noise::Bind { noise: &mut noise };
-            g.pass(bind, (), Extent::new(DELIOT_BELCOUR_NOISE_SIZE, DELIOT_BELCOUR_NOISE_SIZE));
-            self.noise = Some(noise);
-        }
+    fn update(&mut self, g: &mut Graph, materials: &[GlintMaterial], _environment: &EnvironmentTables) {
+        self.noise.update(
+            materials,
+            |_| Some(()),
+            |wanted| {
+                wanted.because(g, "the noise map of Deliot and Belcour 2023; first frame");
+                let bytes = 16 * u64::from(DELIOT_BELCOUR_NOISE_SIZE).pow(2);
+                let mut noise = Buffer::new("deliot_belcour_noise", bytes, Lifetime::Scene);
+                let bind = deliot_belcour_noise::Bind { noise: &mut noise };
+                g.pass(bind, (), Extent::new(DELIOT_BELCOUR_NOISE_SIZE, DELIOT_BELCOUR_NOISE_SIZE));
+                Some(noise)
+            },
+        );
     }
 
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
-        let (Some(lobe), Some(noise)) = (self.environment.lobe(), &self.noise) else { return };
+        let Some(noise) = self.noise.of(material) else { return };
+        let lobe = shading.environment.beckmann();
         let values = &material.values;
         let alpha = values.number("alpha");
         let randomization = values.number("density_randomization");
@@ -152,7 +155,7 @@ impl Method for DeliotBelcour {
             albedo: &lobe.albedo,
             noise: noise,
         );
-        g.pass(bind, params, shading.gbuffer.ids.extent());
+        shading.pass(g, bind, params, material);
     }
 }
 

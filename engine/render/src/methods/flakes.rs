@@ -15,13 +15,13 @@
 //! `most` (3,300 for the largest `most` in the smallest `steps`), and never more than 4,000: where these do not suffice, as
 //! under many lights, the largest footprints show what is expected of them. Needs shaderInt64 and shaderFloat64.
 
-use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints, leaf_level};
-use crate::environment_tables::{Cones, EnvironmentTables};
+use super::shared::{Shared, Wanted};
+use super::{Claim, GlintMaterial, Method, MethodInfo, Reads, Rung, Shading, bind_glints, leaf_level};
+use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Buffer, Extent, Graph, Image, Lifetime};
 use mica_shaders::glints::flakes::{Bind, Params};
 use mica_shaders::{constants as c, flake_counts, types};
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub(super) const INFO: MethodInfo = MethodInfo {
@@ -75,36 +75,37 @@ fn most_steps(most: f64, count: u64, tests: f64) -> f64 {
     if most > 0.0 { walked + flakes(looked_at) + tests * flakes(most) } else { 0.0 }
 }
 
-/// The counts of the quadtree's nodes at one level, and what they were made for.
-struct Counts {
-    buffer: Buffer,
-    made_for: (u64, u32),
-}
+/// Flakes in a square of texture space, and their seed.
+type FlakeSet = (u64, u32);
 
-/// What the flakes mirror, and the half-angle that it was made for.
-struct Mirrored {
-    cones: Cones,
-    gamma_deg: f64,
-}
-
-/// The method at work; tables by the material's index.
+/// The method at work.
 #[derive(Default)]
 pub(crate) struct EveryFlake {
-    counts: BTreeMap<usize, Counts>,
-    mirrored: BTreeMap<usize, Mirrored>,
+    /// Of the quadtree's nodes on one level.
+    counts: Shared<FlakeSet, Buffer>,
 }
 
-/// Parts `count` flakes level by level down to `level`.
-fn count_flakes(g: &mut Graph, name: &str, (count, seed): (u64, u32), level: u32) -> Buffer {
-    let table = |at: u32| Buffer::new(format!("flake_counts {name}"), 8 << (2 * at), Lifetime::Settings);
-    let mut counts = table(0);
+/// Parts flakes level by level, down to leaves or to the last level that is tabulated.
+fn count_flakes(g: &mut Graph, wanted: Wanted<FlakeSet, Buffer>) -> Buffer {
+    let (count, seed) = wanted.key;
+    let change = match wanted.before {
+        Some((before, _)) if before != count => format!("count is now {}", Value::Number(count as f64)),
+        Some(_) => format!("seed is now {seed}"),
+        None => format!("first frame with {} flakes", Value::Number(count as f64)),
+    };
+    wanted.because(g, change);
+    let level = leaf_level(count).min(c::FLAKE_TABLE_LEVEL);
+    let bytes = |at: u32| 8 << (2 * at);
+    let spare = wanted.spare.filter(|spare| spare.bytes() == bytes(level));
+    let mut table = Some(spare.unwrap_or_else(|| Buffer::new("flake_counts", bytes(level), Lifetime::Settings)));
+    let mut on = |g: &mut Graph, at: u32| {
+        let last = table.take_if(|_| at == level);
+        last.unwrap_or_else(|| g.buffer(format!("flake_counts {at}"), bytes(at)))
+    };
+    let mut counts = on(g, 0);
     g.upload(&mut counts, Arc::<[u8]>::from(count.to_le_bytes().as_slice()));
     for above in 0..level {
-        let mut children = if above + 1 == level {
-            table(level)
-        } else {
-            g.buffer(format!("flake_counts {}", above + 1), 8 << (2 * (above + 1)))
-        };
+        let mut children = on(g, above + 1);
         let bind = flake_counts::Bind { parents: &counts, children: &mut children };
         g.pass(bind, flake_counts::Params { level: above, seed }, Extent::line(1 << (2 * above)));
         counts = children;
@@ -113,41 +114,19 @@ fn count_flakes(g: &mut Graph, name: &str, (count, seed): (u64, u32), level: u32
 }
 
 impl Method for EveryFlake {
-    fn keep(&mut self, materials: &[GlintMaterial]) {
-        let kept = |index: &usize| materials.iter().any(|material| material.index == *index);
-        self.counts.retain(|index, _| kept(index));
-        self.mirrored.retain(|index, _| kept(index));
+    fn update(&mut self, g: &mut Graph, materials: &[GlintMaterial], _environment: &EnvironmentTables) {
+        let set = |material: &GlintMaterial| Some((material.flakes(), material.values.number("seed") as u32));
+        self.counts.update(materials, set, |wanted| Some(count_flakes(g, wanted)));
     }
 
-    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables) {
-        let set = (material.flakes(), material.values.number("seed") as u32);
-        let before = self.counts.get(&material.index).map(|counts| counts.made_for);
-        if before != Some(set) {
-            let change = match before {
-                Some((count, _)) if count != set.0 => format!("count is now {}", Value::Number(set.0 as f64)),
-                Some(_) => format!("seed is now {}", set.1),
-                None => format!("first frame with {} flakes", Value::Number(set.0 as f64)),
-            };
-            g.because(format!("material {}: {change}", material.name));
-            let level = leaf_level(set.0).min(c::FLAKE_TABLE_LEVEL);
-            let buffer = count_flakes(g, &material.name, set, level);
-            self.counts.insert(material.index, Counts { buffer, made_for: set });
-        }
-        let gamma_deg = material.values.number("gamma_deg");
-        let before = self.mirrored.get(&material.index).map(|mirrored| mirrored.gamma_deg);
-        if before != Some(gamma_deg) {
-            let change = if before.is_some() { "gamma is now" } else { "first frame with gamma" };
-            g.because(format!("material {}: {change} {gamma_deg} degrees", material.name));
-            let cones = environment.cones(g, gamma_deg.to_radians());
-            self.mirrored.insert(material.index, Mirrored { cones, gamma_deg });
-        }
+    fn reads(&self) -> Reads {
+        Reads::Cones
     }
 
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
-        let index = material.index;
-        let (Some(counts), Some(Mirrored { cones, .. })) = (self.counts.get(&index), self.mirrored.get(&index)) else {
-            return;
-        };
+        let half_angle_radians = material.values.number("gamma_deg").to_radians();
+        let Some(cones) = shading.environment.cones(half_angle_radians) else { return };
+        let Some(flake_counts) = self.counts.of(material) else { return };
         let count = material.flakes();
         let alpha = material.values.number("alpha");
         let leaf_level = leaf_level(count);
@@ -182,9 +161,9 @@ impl Method for EveryFlake {
                 environment_cone: &cones.means,
                 light_rings: &cones.rings,
                 small_lights: &cones.lights,
-                flake_counts: &counts.buffer,
+                flake_counts: flake_counts,
             );
-            g.pass(bind, params, extent);
+            shading.pass(g, bind, params, material);
         }
     }
 }

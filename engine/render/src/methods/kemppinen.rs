@@ -29,9 +29,7 @@
 //! of half vectors to which a flake of cone sigma responds, sigma / (4 i.h), times the warp's Jacobian: for GGX,
 //! alpha_g^2 = (1 - cos gamma) sqrt(den) / (32 i.h). `alpha_g` sets it as printed instead.
 
-use super::lobe::SmoothEnvironment;
 use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
-use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Graph, Image};
 use mica_shaders::glints::kemppinen::{Bind, Params};
@@ -80,17 +78,11 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 
 /// The method at work. It needs no tables of its own, only the environment's.
 #[derive(Default)]
-pub(crate) struct Kemppinen {
-    environment: SmoothEnvironment,
-}
+pub(crate) struct Kemppinen;
 
 impl Method for Kemppinen {
-    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables) {
-        self.environment.update(g, material, environment);
-    }
-
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
-        let Some(lobe) = self.environment.lobe() else { return };
+        let lobe = shading.environment.beckmann();
         let values = &material.values;
         let params = Params {
             material: material.index as u32,
@@ -104,6 +96,6 @@ impl Method for Kemppinen {
             repaired: u32::from(values.flag("repaired")),
         };
         let bind = bind_glints!(Bind, shading, glints, prefiltered: &lobe.prefiltered, albedo: &lobe.albedo);
-        g.pass(bind, params, shading.gbuffer.ids.extent());
+        shading.pass(g, bind, params, material);
     }
 }

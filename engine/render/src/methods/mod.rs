@@ -1,13 +1,14 @@
 //! How glints are estimated: each method in a file of its own, which says what it claims and what it can be set to.
 
 mod atanasov;
+mod auto;
 mod chermain;
 mod deliot_belcour;
 mod dpf;
 mod flakes;
 mod jakob;
 mod kemppinen;
-mod lobe;
+mod shared;
 mod shopf;
 mod smooth;
 mod wang2018;
@@ -15,16 +16,18 @@ mod wang2020;
 mod wang_bowles;
 mod zirr_kaplanyan;
 
+pub use auto::AUTO_METHOD;
+pub(crate) use auto::choose;
 pub use dpf::lit_probability_table;
 pub use jakob::JakobTable;
 
 use crate::environment_tables::EnvironmentTables;
-use crate::passes::GBuffer;
+use crate::passes::{GBuffer, GlintTiles};
 use crate::scene_buffers::SceneBuffers;
 use crate::settings::{Kind, Setting, SettingError, Value, Values};
 use crate::{Cache, Progress, RenderError, Update};
 use mica_gpu::Executor;
-use mica_graph::{Buffer, Graph, Image};
+use mica_graph::{Bind, Buffer, Graph, Image};
 use mica_shaders::constants::FLAKES_A_LEAF;
 
 /// What a method promises of its pictures; the tests hold it to this.
@@ -171,6 +174,11 @@ pub fn method(name: &str) -> Result<&'static MethodInfo, SettingError> {
     })
 }
 
+/// Whether a material can ask for a method by that name: one of [`METHODS`], or [`AUTO_METHOD`].
+pub fn check_method(name: &str) -> Result<(), SettingError> {
+    if name == AUTO_METHOD { Ok(()) } else { method(name).map(|_| ()) }
+}
+
 /// The method of materials that name none.
 pub(crate) fn default_method() -> &'static MethodInfo {
     METHODS.iter().find(|method| method.name == DEFAULT_METHOD).unwrap_or(&METHODS[0])
@@ -192,6 +200,8 @@ pub struct GlintMaterial {
     pub name: String,
     /// The method that renders it.
     pub method: &'static MethodInfo,
+    /// Why the renderer chose it; none where it was asked for by name.
+    pub chosen: Option<String>,
     /// The method's settings.
     pub values: Values,
     /// Which set of texture coordinates the flakes lie in.
@@ -232,9 +242,31 @@ pub(crate) struct Shading<'a> {
     pub scene: &'a SceneBuffers,
     pub frame: &'a Buffer,
     pub gbuffer: &'a GBuffer,
+    /// Derivatives of the flakes' texture coordinates.
+    pub footprint: &'a Image,
     pub shadow_mask: &'a Image,
-    /// The environment's map with its levels; a black texel without one.
-    pub environment: &'a Image,
+    pub environment: &'a EnvironmentTables,
+    pub tiles: &'a GlintTiles,
+}
+
+impl Shading<'_> {
+    /// Declares a glint shader over the tiles that show a material.
+    pub fn pass<B: Bind>(&self, g: &mut Graph, bind: B, params: B::Params, material: &GlintMaterial) {
+        self.pass_named(g, B::SHADER.name, bind, params, material);
+    }
+
+    /// The same under another name.
+    pub fn pass_named<B: Bind>(
+        &self,
+        g: &mut Graph,
+        name: &'static str,
+        bind: B,
+        params: B::Params,
+        material: &GlintMaterial,
+    ) {
+        let list = self.tiles.of_material(material);
+        g.pass_indirect_named(name, bind, params, &self.tiles.lists, GlintTiles::arguments(list));
+    }
 }
 
 /// Fills the `Bind` of a glint shader: what all of them read, and what is its method's own.
@@ -248,9 +280,12 @@ macro_rules! bind_glints {
             position: &$shading.gbuffer.position,
             normal: &$shading.gbuffer.normal,
             uv: &$shading.gbuffer.uv,
-            footprint: &$shading.gbuffer.footprint,
+            footprint: $shading.footprint,
             specular: &$shading.gbuffer.specular,
             shadow_mask: $shading.shadow_mask,
+            materials: &$shading.scene.materials,
+            listed_tiles: &$shading.tiles.listed,
+            tile_lists: &$shading.tiles.lists,
             $($name: $value,)*
             glints: &mut *$glints,
         }
@@ -272,11 +307,14 @@ pub(crate) trait Method {
         Ok(Vec::new())
     }
 
-    /// Gives back the tables of all materials but these.
-    fn keep(&mut self, _materials: &[GlintMaterial]) {}
+    /// Declares the passes that bring the tables of its materials up to date, none where nothing they depend on changed, and
+    /// gives back what these materials do not use.
+    fn update(&mut self, _g: &mut Graph, _materials: &[GlintMaterial], _environment: &EnvironmentTables) {}
 
-    /// Declares the passes that bring this material's tables up to date; none where nothing they depend on changed.
-    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables);
+    /// What it reads of the environment, where there is one.
+    fn reads(&self) -> Reads {
+        Reads::Lobe
+    }
 
     /// Declares the pass that writes this material's pixels of `glints`.
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image);
@@ -285,6 +323,17 @@ pub(crate) trait Method {
     fn finish(&self, _material: &GlintMaterial) -> Finish {
         Finish::default()
     }
+}
+
+/// What a method reads of the environment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Reads {
+    /// What a smooth Beckmann lobe sees of it: for methods whose papers have lights only.
+    Lobe,
+    /// Means over the flakes' cones.
+    Cones,
+    /// Its map.
+    Map,
 }
 
 /// What a method asks for after shading.

@@ -30,9 +30,7 @@
 //! A look, with this bound: near the origin the mean over many sparkles is the mixture of both smooth lobes (measured on
 //! lavapipe within 8 %, of noise), and no pixel of the broad one is above 848 times it.
 
-use super::lobe::SmoothEnvironment;
 use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
-use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Graph, Image};
 use mica_shaders::glints::shopf::{Bind, Params};
@@ -86,17 +84,11 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 
 /// The method at work. It needs no tables of its own, only the environment's.
 #[derive(Default)]
-pub(crate) struct Shopf {
-    environment: SmoothEnvironment,
-}
+pub(crate) struct Shopf;
 
 impl Method for Shopf {
-    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables) {
-        self.environment.update(g, material, environment);
-    }
-
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
-        let Some(lobe) = self.environment.lobe() else { return };
+        let lobe = shading.environment.beckmann();
         let values = &material.values;
         let alpha = values.number("alpha");
         let params = Params {
@@ -111,6 +103,6 @@ impl Method for Shopf {
             repaired: u32::from(values.flag("repaired")),
         };
         let bind = bind_glints!(Bind, shading, glints, prefiltered: &lobe.prefiltered, albedo: &lobe.albedo);
-        g.pass(bind, params, shading.gbuffer.ids.extent());
+        shading.pass(g, bind, params, material);
     }
 }

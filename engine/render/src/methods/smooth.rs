@@ -2,9 +2,7 @@
 //!
 //! The environment's part is a split sum (Karis 2013): exact in the lobe's albedo, approximate in the lobe's shape.
 
-use super::lobe::SmoothEnvironment;
 use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
-use crate::environment_tables::EnvironmentTables;
 use mica_graph::{Graph, Image};
 use mica_shaders::glints::smooth::{Bind, Params};
 
@@ -23,20 +21,14 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 
 /// The smooth limit at work. It needs no tables of its own, only the environment's.
 #[derive(Default)]
-pub(crate) struct Smooth {
-    environment: SmoothEnvironment,
-}
+pub(crate) struct Smooth;
 
 impl Method for Smooth {
-    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables) {
-        self.environment.update(g, material, environment);
-    }
-
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
-        let Some(lobe) = self.environment.lobe() else { return };
+        let lobe = shading.environment.beckmann();
         let params = Params { material: material.index as u32, alpha: material.values.number("alpha") as f32 };
         let bind = bind_glints!(Bind, shading, glints, prefiltered: &lobe.prefiltered, albedo: &lobe.albedo);
         // Its own name: it shares the frame of the glints' shader, but there are no glints.
-        g.pass_named(INFO.name, bind, params, shading.gbuffer.ids.extent());
+        shading.pass_named(g, INFO.name, bind, params, material);
     }
 }

@@ -27,15 +27,15 @@
 //!
 //! Needs shaderInt64.
 
-use super::dpf::{self, Accumulated, DpfSource};
-use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
+use super::dpf::{self, AccumulatedKey, DpfSource};
+use super::shared::Shared;
+use super::{Claim, GlintMaterial, Method, MethodInfo, Reads, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use crate::{Cache, Progress, RenderError, Update};
 use mica_gpu::Executor;
 use mica_graph::{Buffer, Graph, Image, Lifetime};
 use mica_shaders::glints::wang2018::{Bind, Params};
-use std::collections::BTreeMap;
 
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: "wang2018",
@@ -105,19 +105,15 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     ],
 };
 
-/// The tables of one material.
-struct Tables {
-    /// The 1-degree table by quadrature, and the roughness it was made for.
-    quadrature: Option<(f64, Buffer)>,
-    accumulated: Accumulated,
-}
+/// What a 1-degree table depends on: how it is made, and the roughness.
+type DpfKey = (DpfSource, f64);
 
 /// The method at work.
 pub(crate) struct Wang2018 {
-    /// Tables that were counted, by how and by the roughness's bits.
-    counted: BTreeMap<(DpfSource, u64), Buffer>,
-    /// By the material's index.
-    tables: BTreeMap<usize, Tables>,
+    /// 1-degree tables.
+    dpf: Shared<DpfKey, Buffer>,
+    /// P(i, o, gamma).
+    accumulated: Shared<AccumulatedKey, Buffer>,
     /// Stands for the table where P has its closed form: shaders bind it but do not read it.
     no_table: Buffer,
 }
@@ -125,7 +121,7 @@ pub(crate) struct Wang2018 {
 impl Default for Wang2018 {
     fn default() -> Self {
         let no_table = Buffer::new("dpf_absent", 16, Lifetime::Scene);
-        Self { counted: BTreeMap::new(), tables: BTreeMap::new(), no_table }
+        Self { dpf: Shared::default(), accumulated: Shared::default(), no_table }
     }
 }
 
@@ -134,9 +130,9 @@ fn source(material: &GlintMaterial) -> Option<DpfSource> {
     (material.values.word("dpf") != "closed").then(|| DpfSource::of(material))
 }
 
-/// Names a table at the material's roughness.
-fn counted_key(source: DpfSource, material: &GlintMaterial) -> (DpfSource, u64) {
-    (source, material.values.number("alpha").to_bits())
+/// The 1-degree table that a material's settings ask for; none where P has its closed form.
+fn dpf_key(material: &GlintMaterial) -> Option<DpfKey> {
+    source(material).map(|source| (source, material.values.number("alpha")))
 }
 
 impl Method for Wang2018 {
@@ -148,51 +144,45 @@ impl Method for Wang2018 {
         progress: Progress,
     ) -> Result<Vec<Update>, RenderError> {
         // Quadrature at one roughness is no longer than a frame.
-        let Some(source @ DpfSource::Counted { .. }) = source(material) else { return Ok(Vec::new()) };
-        let key = counted_key(source, material);
-        if self.counted.contains_key(&key) {
+        let Some(key @ (source @ DpfSource::Counted { .. }, alpha)) = dpf_key(material) else { return Ok(Vec::new()) };
+        if self.dpf.get(key).is_some() {
             return Ok(Vec::new());
         }
-        let alphas = [material.values.number("alpha") as f32];
-        let (table, update) = dpf::precompute(source, &alphas, executor, cache, progress)?;
-        self.counted.insert(key, table);
+        let (table, update) = dpf::precompute(source, &[alpha as f32], executor, cache, progress)?;
+        self.dpf.insert(key, table);
         Ok(vec![update])
     }
 
-    fn keep(&mut self, materials: &[GlintMaterial]) {
-        self.tables.retain(|index, _| materials.iter().any(|material| material.index == *index));
-        let wanted = |key| {
-            materials.iter().any(|material| source(material).is_some_and(|source| counted_key(source, material) == key))
+    fn update(&mut self, g: &mut Graph, materials: &[GlintMaterial], _environment: &EnvironmentTables) {
+        let there = self.dpf.keys();
+        // Counting takes too long for a frame: it happens in `precompute`, and a table by quadrature stands in without it.
+        let found = |material: &GlintMaterial| {
+            let key = dpf_key(material)?;
+            Some(if there.contains(&key) { key } else { (DpfSource::Quadrature, key.1) })
         };
-        self.counted.retain(|key, _| wanted(*key));
+        self.dpf.update(materials, found, |wanted| {
+            let (_, alpha) = wanted.key;
+            wanted.because(g, format_args!("directional probabilities at alpha {alpha}"));
+            Some(dpf::quadrature(g, &[alpha as f32], wanted.spare))
+        });
+        let key = |material: &GlintMaterial| {
+            found(material).map(|(source, alpha)| (alpha, material.values.number("gamma_deg"), source))
+        };
+        self.accumulated.update(materials, key, |wanted| {
+            let (alpha, _, source) = wanted.key;
+            let table = self.dpf.get((source, alpha))?;
+            Some(dpf::accumulated(g, wanted, (&[alpha as f32], table)))
+        });
     }
 
-    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, _environment: &mut EnvironmentTables) {
-        let Some(wanted) = source(material) else { return };
-        let alpha = material.values.number("alpha");
-        let alphas = [alpha as f32];
-        let tables = self
-            .tables
-            .entry(material.index)
-            .or_insert_with(|| Tables { quadrature: None, accumulated: Accumulated::new(&material.name) });
-        if let Some(dpf) = self.counted.get(&counted_key(wanted, material)) {
-            tables.accumulated.update(g, material, alpha, (wanted, &alphas, dpf));
-            return;
-        }
-        // Counting takes too long for a frame: it happens in `precompute`, and this table stands in without it.
-        if tables.quadrature.as_ref().is_none_or(|(made_for, _)| *made_for != alpha) {
-            g.because(format!("material {}: directional probabilities at alpha {alpha}", material.name));
-            tables.quadrature = Some((alpha, dpf::quadrature(g, &alphas)));
-        }
-        if let Some((_, dpf)) = &tables.quadrature {
-            tables.accumulated.update(g, material, alpha, (DpfSource::Quadrature, &alphas, dpf));
-        }
+    fn reads(&self) -> Reads {
+        Reads::Map
     }
 
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
         let values = &material.values;
         let flakes = material.flakes();
-        let tables = self.tables.get(&material.index).filter(|_| source(material).is_some());
+        let accumulated = self.accumulated.of(material);
         let params = Params {
             material: material.index as u32,
             alpha: values.number("alpha") as f32,
@@ -204,12 +194,13 @@ impl Method for Wang2018 {
             seed: values.number("seed") as u32,
             expectation_above: values.number("expectation") as f32,
             samples: values.number("samples") as u32,
-            closed_form: u32::from(tables.is_none()),
+            closed_form: u32::from(accumulated.is_none()),
             interpolated: u32::from(values.flag("interpolated")),
             weighted: u32::from(values.flag("weighted")),
         };
-        let accumulated = tables.map_or(&self.no_table, |tables| &tables.accumulated.table);
-        let bind = bind_glints!(Bind, shading, glints, accumulated: accumulated, environment: shading.environment);
-        g.pass(bind, params, shading.gbuffer.ids.extent());
+        let accumulated = accumulated.unwrap_or(&self.no_table);
+        let bind =
+            bind_glints!(Bind, shading, glints, accumulated: accumulated, environment: shading.environment.map());
+        shading.pass(g, bind, params, material);
     }
 }

@@ -32,9 +32,7 @@
 //! random numbers come from the project's integer hash; the position is that in scene space, as no method is told of an
 //! object's. The paper has no environment: it is the smooth lobe's, without sparkles.
 
-use super::lobe::SmoothEnvironment;
 use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
-use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Graph, Image};
 use mica_shaders::glints::wang_bowles::{Bind, Params};
@@ -107,17 +105,11 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 
 /// The method at work. It needs no tables of its own, only the environment's.
 #[derive(Default)]
-pub(crate) struct WangBowles {
-    environment: SmoothEnvironment,
-}
+pub(crate) struct WangBowles;
 
 impl Method for WangBowles {
-    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables) {
-        self.environment.update(g, material, environment);
-    }
-
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
-        let Some(lobe) = self.environment.lobe() else { return };
+        let lobe = shading.environment.beckmann();
         let values = &material.values;
         let params = Params {
             material: material.index as u32,
@@ -133,6 +125,6 @@ impl Method for WangBowles {
             repaired: u32::from(values.flag("repaired")),
         };
         let bind = bind_glints!(Bind, shading, glints, prefiltered: &lobe.prefiltered, albedo: &lobe.albedo);
-        g.pass(bind, params, shading.gbuffer.ids.extent());
+        shading.pass(g, bind, params, material);
     }
 }

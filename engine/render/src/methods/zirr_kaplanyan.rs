@@ -32,9 +32,7 @@
 //! pieces of the lobe are told apart in the shared frame about the normal, as no tangents of the texture are at hand.
 //! The paper has lights only: the environment is the smooth lobe's.
 
-use super::lobe::SmoothEnvironment;
 use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
-use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Graph, Image};
 use mica_shaders::glints::zirr_kaplanyan::{Bind, Params};
@@ -93,17 +91,11 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 
 /// The method at work. It needs no tables of its own, only the environment's.
 #[derive(Default)]
-pub(crate) struct ZirrKaplanyan {
-    environment: SmoothEnvironment,
-}
+pub(crate) struct ZirrKaplanyan;
 
 impl Method for ZirrKaplanyan {
-    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables) {
-        self.environment.update(g, material, environment);
-    }
-
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
-        let Some(lobe) = self.environment.lobe() else { return };
+        let lobe = shading.environment.beckmann();
         let values = &material.values;
         let params = Params {
             material: material.index as u32,
@@ -118,6 +110,6 @@ impl Method for ZirrKaplanyan {
             root_two: u32::from(values.flag("root_two")),
         };
         let bind = bind_glints!(Bind, shading, glints, prefiltered: &lobe.prefiltered, albedo: &lobe.albedo);
-        g.pass(bind, params, shading.gbuffer.ids.extent());
+        shading.pass(g, bind, params, material);
     }
 }

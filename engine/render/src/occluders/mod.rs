@@ -3,15 +3,15 @@
 mod bvh;
 mod structures;
 
+use crate::moved::Moved;
 use crate::scene::{AlphaMode, Instance, Mesh, Scene};
-use crate::scene_buffers::{SceneBuffers, why_moved};
+use crate::scene_buffers::SceneBuffers;
 use crate::{Progress, RenderError, Update};
 use bvh::Bvh;
 use glam::DAffine3;
 use mica_gpu::{DeviceInfo, DeviceKind, Executor, Timing};
 use mica_graph::{Buffer, Graph, Work};
 use mica_shaders::types;
-use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
@@ -98,8 +98,10 @@ pub(crate) struct Occluders {
     body: Body,
     /// Whether alpha masks cut holes into some of it. Scenes without bind and test nothing for them.
     masked: bool,
+    /// Of each mesh, whether they cut holes into it.
+    masked_meshes: Vec<bool>,
     /// The instances that moved since the last update.
-    moved: BTreeSet<usize>,
+    pub moved: Moved,
     /// Whether they were declared: what is done from then on has other reasons.
     declared: bool,
     /// Why the next update does what it does.
@@ -130,11 +132,13 @@ impl Occluders {
             OcclusionBackend::Bvh => Body::Bvh(Bvh::build(scene, &places, placed)?),
             OcclusionBackend::RayQuery => Body::Structures(Structures::new(scene, buffers, &places)?),
         };
+        let masked_meshes = masked_meshes(scene).collect::<Vec<_>>();
         let masked = scene.instances.iter().any(|instance| {
-            let mesh = &scene.meshes[instance.mesh];
-            mesh.triangle_count() > 0 && is_masked(scene, mesh)
+            let triangles = scene.meshes[instance.mesh].triangle_count();
+            triangles > 0 && masked_meshes[instance.mesh]
         });
-        Ok(Some(Self { body, masked, moved: BTreeSet::new(), declared: false, why: FIRST_ASKED.to_owned() }))
+        let why = FIRST_ASKED.to_owned();
+        Ok(Some(Self { body, masked, masked_meshes, moved: Moved::default(), declared: false, why }))
     }
 
     /// As [`Occluders::new`], with all that takes long done on a device of our own: a frame finds it ready.
@@ -198,17 +202,24 @@ impl Occluders {
         })
     }
 
-    /// Takes note that an instance moved.
-    pub fn note_moved(&mut self, instance: usize) {
-        self.moved.insert(instance);
-    }
-
-    /// Follows the instances that moved: what the host has to do, before anything is declared.
-    pub fn follow(&mut self, scene: &Scene, buffers: &SceneBuffers) -> Result<(), RenderError> {
-        let Some(why) = why_moved(&self.moved) else { return Ok(()) };
+    /// Follows alpha masks that came or went, which makes all anew, and the instances that moved: what the host has to do,
+    /// before anything is declared.
+    pub fn follow(
+        &mut self,
+        backend: OcclusionBackend,
+        scene: &Scene,
+        buffers: &SceneBuffers,
+    ) -> Result<(), RenderError> {
+        if !masked_meshes(scene).eq(self.masked_meshes.iter().copied()) {
+            if let Some(anew) = Self::new(backend, scene, buffers)? {
+                *self = Self { why: "alpha masks came or went".to_owned(), ..anew };
+            }
+            return Ok(());
+        }
+        let Some(why) = self.moved.why() else { return Ok(()) };
         let why = if self.declared { why } else { FIRST_ASKED.to_owned() };
         let places = all_places(scene, buffers);
-        let moved: Vec<(usize, DAffine3)> = self.moved.iter().map(|&index| (index, places[index].1)).collect();
+        let moved: Vec<(usize, DAffine3)> = self.moved.instances().map(|index| (index, places[index].1)).collect();
         match &mut self.body {
             Body::Bvh(bvh) => bvh.place(scene, buffers, &places, &moved)?,
             Body::Structures(structures) => structures.place(scene, buffers, &places, &moved, why.clone())?,
@@ -244,6 +255,11 @@ fn all_places(scene: &Scene, buffers: &SceneBuffers) -> Vec<(usize, DAffine3)> {
     scene.instances.iter().map(place).collect()
 }
 
+/// Of each mesh, whether an alpha mask cuts holes into it.
+fn masked_meshes(scene: &Scene) -> impl Iterator<Item = bool> + '_ {
+    scene.meshes.iter().map(|mesh| is_masked(scene, mesh))
+}
+
 /// Whether an alpha mask cuts holes into a mesh.
 fn is_masked(scene: &Scene, mesh: &Mesh) -> bool {
     scene.materials.get(mesh.material).is_some_and(|material| material.alpha != AlphaMode::Opaque)
@@ -262,11 +278,11 @@ fn run(executor: &mut Executor, g: Graph) -> Result<Vec<Update>, RenderError> {
 /// Declares a pass that asks the occluders, by that variant of its shader that knows who answers. In `Bind` is what the
 /// pass itself binds, less what variants with masks bind anyway: that is in `Unmasked`.
 macro_rules! pass_with_rays {
-    ($g:expr, $shader:ident, $occluders:expr, $scene:expr, $extent:expr, $params:expr, Bind { $($own:tt)* }
+    ($g:expr, $shader:ident, $occluders:expr, $scene:expr, $over:expr, $params:expr, Bind { $($own:tt)* }
      $(, Unmasked { $($field:ident: $value:expr),* $(,)? })? $(,)?) => {
         match $occluders.body() {
             $crate::occluders::Body::Bvh(bvh) => $crate::occluders::pass_with_rays!(
-                @ $g, $shader, bvh, bvh_masked, $occluders, $scene, $extent, $params,
+                @ $g, $shader, bvh, bvh_masked, $occluders, $scene, $over, $params,
                 {
                     bvh_nodes: &bvh.nodes.buffer,
                     bvh_triangles: &bvh.triangles.buffer,
@@ -276,13 +292,13 @@ macro_rules! pass_with_rays {
                 { $($($field: $value,)*)? }
             ),
             $crate::occluders::Body::Structures(structures) => $crate::occluders::pass_with_rays!(
-                @ $g, $shader, ray_query, ray_query_masked, $occluders, $scene, $extent, $params,
+                @ $g, $shader, ray_query, ray_query_masked, $occluders, $scene, $over, $params,
                 { scene_structure: &structures.scene, $($own)* },
                 { $($($field: $value,)*)? }
             ),
         }
     };
-    (@ $g:expr, $shader:ident, $plain:ident, $masked:ident, $occluders:expr, $scene:expr, $extent:expr, $params:expr,
+    (@ $g:expr, $shader:ident, $plain:ident, $masked:ident, $occluders:expr, $scene:expr, $over:expr, $params:expr,
      { $($bound:tt)* }, { $($unmasked:tt)* }) => {
         if $occluders.masked() {
             use mica_shaders::$shader::$masked::*;
@@ -297,10 +313,10 @@ macro_rules! pass_with_rays {
                 atlas_linear: &$scene.atlas_linear.image,
                 $($bound)*
             };
-            $g.pass(bind, $params, $extent);
+            $g.pass_over(bind, $params, $over);
         } else {
             use mica_shaders::$shader::$plain::*;
-            $g.pass(Bind { $($unmasked)* $($bound)* }, $params, $extent);
+            $g.pass_over(Bind { $($unmasked)* $($bound)* }, $params, $over);
         }
     };
 }

@@ -15,7 +15,7 @@ pub(crate) fn base(
     gbuffer: &GBuffer,
     shadow_mask: &Image,
 ) -> Image {
-    let mut radiance = g.image("base", Format::Rgba32Float, gbuffer.ids.extent());
+    let mut radiance = g.image("radiance", Format::Rgba32Float, gbuffer.ids.extent());
     let lobe = environment.ggx();
     let bind = Bind {
         frame,

@@ -1,5 +1,6 @@
 //! Gaussian blurs over a few pixels, one axis after the other.
 
+use super::GlintTiles;
 use mica_graph::{Buffer, Format, Graph, Image};
 use mica_shaders::{blur_glints, blur_visibility};
 
@@ -15,25 +16,48 @@ fn weights(radius: i32) -> [f32; 5] {
     gaussian.map(|weight| (weight / total) as f32)
 }
 
-/// Blurs the glints' radiance.
-pub(crate) fn blur_glints(g: &mut Graph, frame: &Buffer, mut source: Image, radius: i32) -> Image {
+/// Blurs the glints' radiance on the tiles of a list; elsewhere it is 0.
+pub(crate) fn blur_glints(
+    g: &mut Graph,
+    frame: &Buffer,
+    (tiles, list): (&GlintTiles, u32),
+    mut source: Image,
+    radius: i32,
+) -> Image {
     for axis in AXES {
         let mut blurred_image = g.image("glints_blurred", Format::Rgba32Float, source.extent());
-        let params = blur_glints::Params { axis, radius, weights: weights(radius) };
-        let bind = blur_glints::Bind { frame, source: &source, blurred_image: &mut blurred_image };
-        g.pass(bind, params, source.extent());
+        g.clear(&mut blurred_image, 0.0);
+        let params = blur_glints::Params { axis, radius, list, weights: weights(radius) };
+        let (listed_tiles, tile_lists) = (&tiles.listed, &tiles.lists);
+        let bind =
+            blur_glints::Bind { frame, source: &source, listed_tiles, tile_lists, blurred_image: &mut blurred_image };
+        g.pass_indirect(bind, params, tile_lists, GlintTiles::arguments(list));
         source = blurred_image;
     }
     source
 }
 
-/// Blurs the visibility of the mirror direction.
-pub(crate) fn blur_visibility(g: &mut Graph, frame: &Buffer, mut source: Image, radius: i32) -> Image {
+/// Blurs the visibility of the mirror direction on the tiles of a list; elsewhere it is 1.
+pub(crate) fn blur_visibility(
+    g: &mut Graph,
+    frame: &Buffer,
+    (tiles, list): (&GlintTiles, u32),
+    mut source: Image,
+    radius: i32,
+) -> Image {
     for axis in AXES {
         let mut blurred_image = g.image("visibility_blurred", Format::R32Float, source.extent());
-        let params = blur_visibility::Params { axis, radius, weights: weights(radius) };
-        let bind = blur_visibility::Bind { frame, source: &source, blurred_image: &mut blurred_image };
-        g.pass(bind, params, source.extent());
+        g.clear(&mut blurred_image, 1.0);
+        let params = blur_visibility::Params { axis, radius, list, weights: weights(radius) };
+        let (listed_tiles, tile_lists) = (&tiles.listed, &tiles.lists);
+        let bind = blur_visibility::Bind {
+            frame,
+            source: &source,
+            listed_tiles,
+            tile_lists,
+            blurred_image: &mut blurred_image,
+        };
+        g.pass_indirect(bind, params, tile_lists, GlintTiles::arguments(list));
         source = blurred_image;
     }
     source

@@ -3,7 +3,7 @@
 use super::GBuffer;
 use crate::occluders::{Occluders, RaysOfPass, pass_with_rays};
 use crate::scene_buffers::SceneBuffers;
-use mica_graph::{Buffer, Format, Graph, Image};
+use mica_graph::{Buffer, Format, Graph, Image, Over};
 
 /// One bit for each light that is occluded.
 pub(crate) fn shadows(
@@ -21,7 +21,7 @@ pub(crate) fn shadows(
         shadows,
         occluders,
         scene,
-        extent,
+        Over::Texels(extent),
         (),
         Bind {
             frame,

@@ -3,7 +3,7 @@
 use crate::RenderError;
 use crate::occluders::{Occluders, RaysOfPass, pass_with_rays};
 use crate::scene_buffers::SceneBuffers;
-use mica_graph::{Buffer, Extent, Graph};
+use mica_graph::{Buffer, Extent, Graph, Over};
 use mica_shaders::types;
 
 /// Rays in one row of the dispatch: every device runs 65,535 groups, of 64 each, along an axis.
@@ -47,7 +47,7 @@ pub(crate) fn trace(
         trace_rays,
         occluders,
         scene,
-        extent,
+        Over::Texels(extent),
         Params { count, closest: u32::from(question == Question::Closest), scene_unit: scene.scene_unit },
         Bind { rays, ray_answers: answers, ray_counts: &mut counted.counts }
     );

@@ -97,11 +97,6 @@ impl Atlas {
         let (srgb, linear) = (pack(true), pack(false));
         Atlas { srgb, linear, records: records.into_iter().flatten().collect(), warnings }
     }
-
-    /// The record of a texture, as shaders count them.
-    pub fn index_of(&self, texture: usize) -> u32 {
-        texture as u32
-    }
 }
 
 /// A texture and the rectangle that its mip chain takes.

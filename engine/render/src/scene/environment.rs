@@ -35,6 +35,13 @@ pub struct EnvironmentReport {
     pub warnings: Vec<String>,
 }
 
+impl EnvironmentReport {
+    /// Texels that were changed, one with two faults counted for each.
+    pub fn bad_texels(&self) -> u64 {
+        self.nan_texels + self.negative_texels + self.infinite_texels + self.huge_texels
+    }
+}
+
 impl EquirectMap {
     /// The greatest radiance that is kept: sums of it stay far inside the range of a 32-bit float.
     pub const GREATEST: f32 = 1e12;

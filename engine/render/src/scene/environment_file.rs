@@ -1,13 +1,13 @@
 //! Environment maps from OpenEXR and Radiance files; sizes are read from the headers and judged before anything is
 //! decoded.
 
+use super::contained::contained;
 use super::environment::{EnvironmentReport, EquirectMap};
 use super::error::{OneLine, SceneError, SceneErrorCode};
 use super::gltf::read_regular_file;
 use super::{environment_exr, memory};
 use image::{ImageDecoder, codecs::hdr::HdrDecoder};
 use std::io::Cursor;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 /// The largest map, texels: 16384 x 8192.
@@ -34,8 +34,7 @@ impl EquirectMap {
 
     /// Reads the bytes of an `.exr` or `.hdr` file; `name` stands for the file's in errors.
     pub fn from_file_bytes(name: &str, bytes: &[u8]) -> Result<(EquirectMap, EnvironmentReport), SceneError> {
-        // The decoders' own checks have holes; what is left is caught, as bytes may come from anywhere.
-        let read = || match bytes {
+        Self::decoded(name, || match bytes {
             [0x76, 0x2f, 0x31, 0x01, ..] => environment_exr::read(bytes),
             [b'#', b'?', ..] => read_hdr(bytes),
             _ => Err(SceneError::new(
@@ -44,11 +43,15 @@ impl EquirectMap {
                 "neither OpenEXR nor Radiance HDR",
                 "give an equirectangular .exr or .hdr file",
             )),
-        };
-        let caught = catch_unwind(AssertUnwindSafe(read));
-        let mut map = caught
-            .unwrap_or_else(|_| Err(invalid("its decoder gave up on it".to_owned())))
-            .map_err(|error| error.in_file(name))?;
+        })
+    }
+
+    /// What a decoder gives, judged and repaired.
+    fn decoded(
+        name: &str,
+        decode: impl FnOnce() -> Result<EquirectMap, SceneError>,
+    ) -> Result<(EquirectMap, EnvironmentReport), SceneError> {
+        let mut map = contained(decode, invalid).map_err(|error| error.in_file(name))?;
         let mut report = map.repair();
         if u64::from(map.width) != 2 * u64::from(map.height) {
             report.warnings.push(format!(
@@ -112,4 +115,17 @@ fn read_hdr(bytes: &[u8]) -> Result<EquirectMap, SceneError> {
     let mut texels = memory::filled([0.0f32; 3], texels, "")?;
     decoder.read_image(bytemuck::cast_slice_mut(&mut texels)).map_err(failed)?;
     Ok(EquirectMap { width, height, texels })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn f43_a_decoder_of_maps_that_panics_is_an_error_of_the_file() {
+        let error = EquirectMap::decoded("sky.exr", || panic!("injected")).expect_err("it panicked");
+        assert_eq!(error.code, SceneErrorCode::InvalidImage);
+        let said = error.to_string();
+        assert!(said.contains("sky.exr") && said.contains("its decoder gave up on it; save the map again"), "{said}");
+    }
 }

@@ -47,6 +47,25 @@ pub struct Material {
     pub glint: Option<Glint>,
 }
 
+impl Material {
+    /// The textures that it uses, but for those of what is not rendered yet.
+    pub fn textures(&self) -> impl Iterator<Item = TextureRef> + use<> {
+        let coat = self.clearcoat.as_ref();
+        let textures = [
+            self.base_color_texture,
+            self.metallic_roughness_texture,
+            self.normal_texture,
+            self.occlusion_texture,
+            self.emissive_texture,
+            coat.and_then(|coat| coat.texture),
+            coat.and_then(|coat| coat.roughness_texture),
+            self.specular.texture,
+            self.specular.color_texture,
+        ];
+        textures.into_iter().flatten()
+    }
+}
+
 impl Default for Material {
     /// The material that glTF gives to a primitive without one.
     fn default() -> Self {

@@ -4,6 +4,7 @@ mod atlas;
 pub mod bvh;
 mod centre;
 mod cone_means;
+mod contained;
 mod environment;
 mod environment_exr;
 mod environment_file;

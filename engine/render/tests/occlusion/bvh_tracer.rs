@@ -148,7 +148,7 @@ fn shader(file: &str, from: &str, to: &str, covered: Option<&str>) -> &'static S
     let tool = std::env::var_os("GLSLANG_VALIDATOR").unwrap_or_else(|| "glslangValidator".into());
     let include = |path: &Path| format!("-I{}", path.display());
     let done = Command::new(tool)
-        .args(covered.map(|_| "-DALPHA_MASKS"))
+        .args(covered.map(|_| "-DMASKED"))
         .args(["--target-env", "vulkan1.2", &include(folder.path()), &include(&shaders), "-o"])
         .args([output.as_path(), &root.join(file)])
         .output()
@@ -170,5 +170,6 @@ fn shader(file: &str, from: &str, to: &str, covered: Option<&str>) -> &'static S
         bindings: bindings.to_vec().leak(),
         params_bytes: 12,
         outputs: &[],
+        effects: mica_graph::Effects::NONE,
     }))
 }

@@ -2,6 +2,7 @@
 //!
 //! The conic's axes i x o and i - o vanish at i = o, where the set is round and any axes would do.
 
+use super::lit_flake::on_the_edge;
 use crate::random::{rounded, turned, unit};
 use crate::{Check, Form, Laboratory, Random, StabilityError, arithmetic, worst_ratio};
 use glam::DVec3;
@@ -13,7 +14,7 @@ use std::f64::consts::TAU;
 
 /// Measures it.
 pub fn measure(laboratory: &mut Laboratory) -> Result<Vec<Check>, StabilityError> {
-    Ok(vec![membership(laboratory)?, probability(laboratory)?])
+    Ok(vec![membership(laboratory)?, edge(laboratory)?, probability(laboratory)?])
 }
 
 /// Light and view that are the same in every other pair, and 1e-8 to 1e-2 apart in the rest, at most
@@ -58,6 +59,21 @@ fn membership(laboratory: &mut Laboratory) -> Result<Check, StabilityError> {
         stable: Form::new("|2 (i.m) m - i - o|^2 <= 4 sin^2(gamma / 2)", wrong(&stable)),
         tolerance: 0.0,
     })
+}
+
+/// The same on the edge, as `flakes` tests each flake.
+fn edge(laboratory: &mut Laboratory) -> Result<Check, StabilityError> {
+    let mut index = 0;
+    on_the_edge(
+        laboratory,
+        "flakes on the edge of cones of .05 to 30 degrees, light and view 0 to .01 apart",
+        |random| {
+            index += 1;
+            let [i, o] = pair(random, index, 1.2);
+            let gamma = random.log_between(0.05, 30.0).to_radians();
+            ([i, o], turned((i + o).normalize(), 0.5 * gamma, random.between(0.0, TAU)))
+        },
+    )
 }
 
 /// Of i = o and of what tends to it: right in both, P is continuous there.

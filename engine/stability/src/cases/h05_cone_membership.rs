@@ -1,5 +1,6 @@
 //! H05. Whether a flake is lit, for narrow cones.
 
+use super::lit_flake::on_the_edge;
 use crate::random::{rounded, turned, unit};
 use crate::{Check, Form, Laboratory, Random, StabilityError, arithmetic};
 use glam::DVec3;
@@ -8,7 +9,12 @@ use std::f64::consts::TAU;
 
 /// Measures it.
 pub fn measure(laboratory: &mut Laboratory) -> Result<Vec<Check>, StabilityError> {
-    Ok(vec![membership(laboratory, 0.05, 1.0)?, membership(laboratory, 0.01, 0.05)?, eigenvalue(laboratory)?])
+    Ok(vec![
+        membership(laboratory, 0.05, 1.0)?,
+        membership(laboratory, 0.01, 0.05)?,
+        edge(laboratory)?,
+        eigenvalue(laboratory)?,
+    ])
 }
 
 /// Flakes within 20 % of the edge of cones between two half-angles in degrees.
@@ -55,6 +61,15 @@ fn membership(laboratory: &mut Laboratory, least: f64, most: f64) -> Result<Chec
         stable: Form::new("|2 (i.m) m - i - o|^2 <= 4 sin^2(gamma / 2)", farthest_wrong(&stable)),
         // 1.7e-7 radians at .01 degrees: three units in the last place of the directions.
         tolerance: 1e-3,
+    })
+}
+
+/// Flakes on the edge itself, as `flakes` tests each.
+fn edge(laboratory: &mut Laboratory) -> Result<Check, StabilityError> {
+    on_the_edge(laboratory, "flakes on the edge of cones of .05 to 1 degrees", |random| {
+        let gamma = random.log_between(0.05, 1.0).to_radians();
+        let (i, o) = (random.direction_about(DVec3::Z, 1.4), random.direction_about(DVec3::Z, 1.4));
+        ([i, o], (i + turned(o, gamma, random.between(0.0, TAU))).normalize())
     })
 }
 

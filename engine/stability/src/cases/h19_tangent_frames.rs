@@ -51,26 +51,11 @@ pub fn measure(laboratory: &mut Laboratory) -> Result<Vec<Check>, StabilityError
     ])
 }
 
-/// Triangles that the loader drops for having no area beside their longest edge, told apart by the host.
+/// Triangles that the loader drops for having no area beside their longest edge, told apart by the host. Their corners are
+/// whole numbers times a power of two, so that integers say without any rounding what they are.
 fn slivers(random: &mut Random, count: usize) -> Result<Check, StabilityError> {
-    let triangles: Vec<[Vec3; 3]> = (0..count)
-        .map(|k| {
-            let edge = random.log_between(1e-15, 1e11) * random.direction_about(DVec3::Z, PI);
-            let along = random.between(0.2, 0.8);
-            // In turn on a line to the bit, within rounding of one, and wide.
-            match k % 3 {
-                0 => [Vec3::ZERO, edge.as_vec3(), 0.5 * edge.as_vec3()],
-                1 => [Vec3::ZERO, edge.as_vec3(), (along * edge).as_vec3()],
-                _ => [Vec3::ZERO, edge.as_vec3(), turned(edge.normalize(), 0.5, 0.0).as_vec3() * edge.length() as f32],
-            }
-        })
-        .collect();
-    // |e1 x e2|^2 <= 1e-20 times the fourth power of the longest edge.
-    let has_area = |[a, b, c]: &[Vec3; 3]| {
-        let [a, b, c] = [a, b, c].map(|corner| corner.as_dvec3());
-        let longest = (b - a).length().max((c - a).length()).max((c - b).length());
-        (b - a).cross(c - a).length() > 1e-10 * longest * longest
-    };
+    let slivers: Vec<Sliver> = (0..count).map(|_| Sliver::new(random)).collect();
+    let triangles: Vec<[Vec3; 3]> = slivers.iter().map(Sliver::corners).collect();
     let has_area_in_f32 = |[a, b, c]: &[Vec3; 3]| {
         let longest = (b - a).length().max((c - a).length()).max((c - b).length());
         (b - a).cross(c - a).length() > 1e-10 * longest * longest
@@ -80,19 +65,86 @@ fn slivers(random: &mut Random, count: usize) -> Result<Check, StabilityError> {
     let corners = |triangle: &[u32; 3]| triangle.map(|corner| Vec3::from(scene.meshes[0].positions[corner as usize]));
     let mut kept = scene.meshes.iter().flat_map(|mesh| mesh.indices.as_chunks::<3>().0).map(corners).peekable();
     let (mut naive, mut stable) = (0, 0);
-    for triangle in &triangles {
+    for (sliver, triangle) in slivers.iter().zip(&triangles) {
         let is_kept = kept.next_if_eq(triangle).is_some();
-        stable += usize::from(is_kept != has_area(triangle));
-        naive += usize::from(has_area_in_f32(triangle) != has_area(triangle));
+        stable += usize::from(is_kept != sliver.has_area());
+        naive += usize::from(has_area_in_f32(triangle) != sliver.has_area());
     }
+    // What is kept and none of these would be wrong, too.
+    stable += kept.count();
     Ok(Check {
-        what: "triangles 1e-15 to 1e11 large, on a line or as good as".to_owned(),
-        error_of: "share of them kept or dropped wrongly by the loader".to_owned(),
+        what: "triangles 1e-15 to 1e11 large, from on a line to wide".to_owned(),
+        error_of: "share of them that the loader keeps or drops otherwise than integers say".to_owned(),
         inputs: count as u64,
         naive: Form::new("the same in f32", naive as f64 / count as f64),
         stable: Form::new("|e1 x e2| beside the longest edge's square, in f64", stable as f64 / count as f64),
         tolerance: 0.0,
     })
+}
+
+/// A triangle of whole coordinates, of which twice the area was drawn first.
+struct Sliver {
+    /// Where its corners are in a plane of two axes.
+    at: [[i64; 2]; 3],
+    twice_area: u64,
+    /// What coordinates are multiples of: a power of two.
+    unit: f32,
+    /// The first axis of its plane.
+    axis: usize,
+}
+
+impl Sliver {
+    fn new(random: &mut Random) -> Self {
+        let mut below = |most: u64| (random.bits() % most) as i64;
+        // Two edges (p, q) and (u, v) with p v - q u as drawn: nothing, or anything up to what a wide triangle has.
+        let (p, q, y) = loop {
+            let [p, q] = [(); 2].map(|()| (1 << 21) + below(1 << 21));
+            if let Some(y) = inverse(q, p) {
+                break (p, q, y);
+            }
+        };
+        let digits = 1 + below(12) as u32;
+        let twice_area = if below(4) == 0 { 0 } else { 1 + below(10_u64.pow(digits)) };
+        // q u = -twice_area modulo p, and v is what that leaves.
+        let u = (-i128::from(y) * i128::from(twice_area)).rem_euclid(p.into()) as i64;
+        let v = (twice_area + q * u) / p;
+        // Wherever f32 still has every whole number.
+        let [x0, y0] = [(); 2].map(|()| below(1 << 23));
+        let unit = 2_f32.powi(below(86) as i32 - 72);
+        let at = [[x0, y0], [x0 + p, y0 + q], [x0 + u, y0 + v]];
+        Self { at, twice_area: twice_area as u64, unit, axis: below(3) as usize }
+    }
+
+    fn corners(&self) -> [Vec3; 3] {
+        self.at.map(|[x, y]| {
+            let mut corner = [0.0; 3];
+            corner[self.axis] = x as f32 * self.unit;
+            corner[(self.axis + 1) % 3] = y as f32 * self.unit;
+            corner.into()
+        })
+    }
+
+    /// Whether |e1 x e2|^2 > 1e-20 of the longest edge to the fourth power, which is what the loader promises.
+    fn has_area(&self) -> bool {
+        let square = |a: usize, b: usize| {
+            let [x, y] = [0, 1].map(|axis| u128::from(self.at[a][axis].abs_diff(self.at[b][axis])));
+            x * x + y * y
+        };
+        let longest = square(0, 1).max(square(0, 2)).max(square(1, 2));
+        // What 128 bits do not hold is more.
+        u128::from(self.twice_area).pow(2).checked_mul(10_u128.pow(20)).is_none_or(|area| area > longest * longest)
+    }
+}
+
+/// The y between 0 and `modulus` for which y x `of` leaves 1 (Euclid), if there is one.
+fn inverse(of: i64, modulus: i64) -> Option<i64> {
+    let (mut left, mut factors) = ([modulus, of % modulus], [0, 1]);
+    while left[1] != 0 {
+        let quotient = left[0] / left[1];
+        left = [left[1], left[0] - quotient * left[1]];
+        factors = [factors[1], factors[0] - quotient * factors[1]];
+    }
+    (left[0] == 1).then(|| factors[0].rem_euclid(modulus))
 }
 
 /// A binary glTF of these triangles.

@@ -1,15 +1,16 @@
 //! H27. The same frame twice; small motions.
 //!
-//! A flake keeps its place and its normal from frame to frame, and a count grows with its mean where the random word is the same. Forms
-//! that draw anew, as soon as a direction passes a whole degree or an acceptance test turns out otherwise, flicker.
+//! A flake keeps its place and its normal from frame to frame, and a count grows with its mean where the random word is the same. Flakes
+//! that are drawn by the number of the frame boil, those drawn by the pixel stand still on the screen while the surface moves
+//! on, and counts flicker where an acceptance test turns out otherwise.
 
-use crate::plane::{Plane, local, radiance};
+use crate::stage::{Plane, local, radiance};
 use crate::{Check, Form, Laboratory, StabilityError, bits};
 use glam::{DQuat, DVec2, DVec3};
 use mica_oracle::flake_set::{FlakeSet, Footprint, hash2, is_lit};
 use mica_oracle::microfacet::{Microfacets, Ndf, SmithFit};
-use mica_render::View;
 use mica_render::scene::Camera;
+use mica_render::{Renderer, View};
 use mica_shaders::types::Words;
 use rayon::prelude::*;
 
@@ -18,6 +19,8 @@ const ALPHA: f64 = 0.3;
 const GAMMA_DEG: f64 = 6.0;
 const COUNT: u64 = 20_000;
 const SEED: u32 = 5;
+/// Frames of a path.
+const FRAMES: u32 = 7;
 /// Angle from the lower to the upper edge of the picture, radians.
 const FOV: f64 = 0.5;
 const EYE: DVec3 = DVec3::new(0.0, 2.0, 2.4);
@@ -31,74 +34,92 @@ pub fn measure(laboratory: &mut Laboratory) -> Result<Vec<Check>, StabilityError
     Ok(checks)
 }
 
-fn plane() -> Plane {
-    Plane { half: 40.0, uv: [0.0; 2], light: Some(SUN.normalize()), environment: None }
+/// The plane by every flake, its texture moved.
+fn renderer(uv: [f32; 2]) -> Result<Renderer, StabilityError> {
+    let plane = Plane { half: 40.0, uv, light: Some(SUN.normalize()), environment: None };
+    let [count, alpha, gamma, seed] =
+        [COUNT as f64, ALPHA, GAMMA_DEG, f64::from(SEED)].map(|number| number.to_string());
+    let settings =
+        [("count", count.as_str()), ("alpha", &alpha), ("gamma_deg", &gamma), ("seed", &seed), ("most", "500")];
+    plane.renderer("flakes", &settings)
 }
 
-fn renderer(method: &str, own: &[(&str, &str)]) -> Result<mica_render::Renderer, StabilityError> {
-    let [count, alpha, gamma] = [COUNT as f64, ALPHA, GAMMA_DEG].map(|number| number.to_string());
-    let seed = SEED.to_string();
-    let all = [("count", count.as_str()), ("alpha", &alpha), ("gamma_deg", &gamma), ("seed", &seed)];
-    plane().renderer(method, &[&all, own].concat())
+/// Makes the random numbers those of a frame.
+fn seed_by_frame(renderer: &mut Renderer, frame: u32) -> Result<(), StabilityError> {
+    Ok(renderer.set(None, "seed", &(SEED + frame).to_string())?)
 }
 
 fn camera(eye: DVec3, target: DVec3) -> Camera {
     Camera::looking_at("eye", eye, target, FOV, 0.01)
 }
 
-/// The same frame over and over again, and a form whose words change with the frame.
+/// The same frame over and over again.
 fn repeated(laboratory: &mut Laboratory) -> Result<Check, StabilityError> {
-    let frames = laboratory.inputs(8, 1000);
+    let frames = laboratory.inputs(8, 1000) as u32;
     let view = View::new(camera(EYE, DVec3::ZERO), SIZE);
-    let mut every_flake = renderer("flakes", &[("most", "500")])?;
-    let first = radiance(laboratory, &mut every_flake, &view)?;
-    let mut differing = 0;
-    for _ in 1..frames {
-        let again = radiance(laboratory, &mut every_flake, &view)?;
-        differing += first.iter().zip(&again).filter(|(a, b)| a.to_bits() != b.to_bits()).count();
-    }
-    // Seeds of their own stand for words drawn anew.
-    let mut anew = renderer("flakes", &[("most", "500"), ("seed", "6")])?;
-    let drawn = radiance(laboratory, &mut anew, &view)?;
-    let changed = first.iter().zip(&drawn).filter(|(a, b)| a.to_bits() != b.to_bits()).count();
-    let pixels = (frames - 1) as f64 * first.len() as f64;
+    let mut share_changed = |by_frame: bool| -> Result<f64, StabilityError> {
+        let mut renderer = renderer([0.0; 2])?;
+        let first = radiance(laboratory, &mut renderer, &view)?;
+        let mut differing = 0;
+        for frame in 1..frames {
+            if by_frame {
+                seed_by_frame(&mut renderer, frame)?;
+            }
+            let again = radiance(laboratory, &mut renderer, &view)?;
+            differing += first.iter().zip(&again).filter(|(a, b)| a.to_bits() != b.to_bits()).count();
+        }
+        Ok(differing as f64 / (f64::from(frames - 1) * first.len() as f64))
+    };
     Ok(Check {
         what: "the same frame, again and again".to_owned(),
         error_of: "share of pixels with other bits than in the first frame".to_owned(),
-        inputs: frames as u64,
-        naive: Form::new("flakes drawn anew", changed as f64 / first.len() as f64),
-        stable: Form::new("flakes by hashes of their place", differing as f64 / pixels),
+        inputs: u64::from(frames),
+        naive: Form::new("flakes by hashes of their place and of the frame's number", share_changed(true)?),
+        stable: Form::new("flakes by hashes of their place", share_changed(false)?),
         tolerance: 0.0,
     })
 }
 
-/// A dolly by .1 % of the distance and a pan by .01 degrees: how much pixels change, against how much the flakes do.
+/// Paths of less than a pixel a frame: how pixels change, against how they do where each flake is followed in f64.
 fn moved(laboratory: &mut Laboratory) -> Result<Vec<Check>, StabilityError> {
-    let pan = DQuat::from_rotation_y(0.01_f64.to_radians());
-    let motions = [
-        ("a dolly by .1 % of the distance", [(EYE, DVec3::ZERO), (EYE * 0.999, DVec3::ZERO)]),
-        ("a pan by .01 degrees", [(EYE, DVec3::ZERO), (EYE, EYE + pan * -EYE)]),
-    ];
+    let pan = |frame: f64| DQuat::from_rotation_y((0.01 * frame).to_radians());
+    // A fifth of the width of the pixel in the middle.
+    let step = 0.2 * EYE.length() * 2.0 * (0.5 * FOV).tan() / f64::from(SIZE[1]);
+    let aside = |frame: f64| step * frame * DVec3::X;
+    let frames = || (0..FRAMES).map(f64::from);
+    let dolly: Path = frames().map(|frame| (EYE * (1.0 - 0.001 * frame), DVec3::ZERO)).collect();
+    let track: Path = frames().map(|frame| (EYE + aside(frame), aside(frame))).collect();
+    let pan: Path = frames().map(|frame| (EYE, EYE + pan(frame) * -EYE)).collect();
+    let by_frame = "flakes by hashes of their place and of the frame's number";
+    let by_pixel = "flakes by hashes of the pixel they are seen in";
     let mut checks = Vec::new();
-    for (what, places) in motions {
-        let of_flakes = change(&places.map(|(eye, target)| expected(eye, target)));
-        let mut of_method = |method: &str, own: &[(&str, &str)]| {
-            let mut renderer = renderer(method, own)?;
-            let [before, after] =
-                places.map(|(eye, target)| radiance(laboratory, &mut renderer, &View::new(camera(eye, target), SIZE)));
-            let change = change(&[before?, after?]);
-            Ok::<f64, StabilityError>((change / of_flakes - 1.0).abs())
+    for (what, path, naive) in [
+        ("a dolly by .1 % of the distance a frame", dolly, by_frame),
+        ("a pan by .01 degrees a frame", pan, by_frame),
+        ("a track by a fifth of a pixel a frame", track, by_pixel),
+    ] {
+        let truth: Vec<Vec<f64>> = path.iter().map(|(eye, target)| expected(*eye, *target)).collect();
+        let mut seen = |form: &str| -> Result<Vec<Vec<f64>>, StabilityError> {
+            let mut kept = renderer([0.0; 2])?;
+            let mut pictures = Vec::new();
+            for ((eye, target), frame) in path.iter().zip(0..) {
+                if form == by_pixel {
+                    // The texture goes with the camera: a pixel shows the same flakes in each frame.
+                    kept = renderer([-target.x as f32, -target.z as f32])?;
+                } else if form == by_frame {
+                    seed_by_frame(&mut kept, frame)?;
+                }
+                pictures.push(radiance(laboratory, &mut kept, &View::new(camera(*eye, *target), SIZE))?);
+            }
+            Ok(pictures)
         };
+        let [naive_seen, stable_seen] = [naive, "flakes by hashes of their place"].map(&mut seen);
         checks.push(Check {
             what: what.to_owned(),
-            error_of: "|sum of |change of a pixel| / sum of pixels, over the same of the flakes in f64, - 1|"
-                .to_owned(),
-            inputs: u64::from(SIZE[0] * SIZE[1]),
-            naive: Form::new(
-                "counts drawn anew for each whole degree",
-                of_method("wang2018", &[("dpf", "closed"), ("samples", "1")])?,
-            ),
-            stable: Form::new("every flake", of_method("flakes", &[("most", "500")])?),
+            error_of: "energy of what frames change by beside the flakes in f64, over that of what those do".to_owned(),
+            inputs: u64::from(FRAMES * SIZE[0] * SIZE[1]),
+            naive: Form::new(naive, strayed(&naive_seen?, &truth)),
+            stable: Form::new("flakes by hashes of their place", strayed(&stable_seen?, &truth)),
             // A fifth of what the list of cases allows. Flakes at edges may be on either side of them in f32.
             tolerance: 0.02,
         });
@@ -106,10 +127,20 @@ fn moved(laboratory: &mut Laboratory) -> Result<Vec<Check>, StabilityError> {
     Ok(checks)
 }
 
-/// By how much the second picture differs from the first.
-fn change([before, after]: &[Vec<f64>; 2]) -> f64 {
-    let sum: f64 = before.iter().zip(after).map(|(before, after)| (after - before).abs()).sum();
-    sum / before.iter().sum::<f64>()
+/// Where the eye is in each frame, and what it looks at.
+type Path = Vec<(DVec3, DVec3)>;
+
+/// The sum of squares of how a picture's change from frame to frame differs from the truth's, over that of the truth's.
+fn strayed(pictures: &[Vec<f64>], truth: &[Vec<f64>]) -> f64 {
+    let (mut beside, mut own) = (0.0, 0.0);
+    for (pictures, truth) in pictures.windows(2).zip(truth.windows(2)) {
+        for pixel in 0..truth[0].len() {
+            let [seen, known] = [pictures, truth].map(|of| of[1][pixel] - of[0][pixel]);
+            beside += (seen - known).powi(2);
+            own += known.powi(2);
+        }
+    }
+    beside / own
 }
 
 /// Radiance of every pixel, flake by flake in f64.

@@ -95,13 +95,23 @@ fn blurred(laboratory: &mut Laboratory, picture: &[f32], beyond: Beyond) -> Resu
     let mut source = g.image("glints", Format::Rgba32Float, extent);
     let texels: Vec<[f32; 4]> = picture.iter().map(|value| [*value; 4]).collect();
     g.upload_image(&mut source, bytemuck::cast_slice::<_, u8>(&texels));
+    // All tiles of the frame, as a list.
+    let tiles: Vec<u32> = (0..width.div_ceil(c::TILE_SIDE) * height.div_ceil(c::TILE_SIDE)).collect();
+    let count = tiles.len() as u32;
+    let lists = [types::TileList { groups: [count, 1, 1], tiles: count }];
+    let mut listed_tiles = g.buffer("listed_tiles", 4 * u64::from(count));
+    g.upload(&mut listed_tiles, bytemuck::cast_slice::<_, u8>(&tiles));
+    let mut tile_lists = g.buffer("tile_lists", size_of_val(&lists) as u64);
+    g.upload(&mut tile_lists, bytemuck::cast_slice::<_, u8>(&lists));
     for axis in [[1, 0], [0, 1]] {
         let mut blurred_image: Image = g.image("glints_blurred", Format::Rgba32Float, extent);
         match beyond {
             Beyond::Mirrored => {
-                let params = blur_glints::Params { axis, radius: RADIUS, weights };
-                let bind = blur_glints::Bind { frame: &frame, source: &source, blurred_image: &mut blurred_image };
-                g.pass(bind, params, extent);
+                let params = blur_glints::Params { axis, radius: RADIUS, list: 0, weights };
+                let (listed_tiles, tile_lists) = (&listed_tiles, &tile_lists);
+                let (frame, source, blurred_image) = (&frame, &source, &mut blurred_image);
+                let bind = blur_glints::Bind { frame, source, listed_tiles, tile_lists, blurred_image };
+                g.pass_indirect(bind, params, tile_lists, 0);
             }
             Beyond::Other(beyond) => {
                 let params = blur_at_edge::Params { axis, radius: RADIUS, beyond, weights };

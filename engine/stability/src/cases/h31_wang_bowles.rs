@@ -1,7 +1,7 @@
 //! H31. Sparkle of Wang and Bowles: levels, normalisation, normal incidence.
 
-use crate::plane::{Plane, radiance};
 use crate::random::turned;
+use crate::stage::{Plane, radiance};
 use crate::{Check, Form, Laboratory, Random, StabilityError, arithmetic, worst_difference, worst_ratio};
 use glam::DVec3;
 use mica_render::View;

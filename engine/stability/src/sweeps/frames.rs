@@ -1,41 +1,37 @@
 //! What only whole frames show: distances, and texture far from its origin.
 
 use super::{Series, Sweep, errors, greatest, linear, log};
-use crate::cases::{distances, expected, radiance_seen, seen_from};
-use crate::count_law::{exact_moments, gated_moments};
-use crate::plane::{Plane, texture_places};
+use crate::cases::{EVERY_FLAKE, GATED, Shown, distances, limit, radiance_seen, seen_from};
+use crate::stage::{Plane, texture_places};
 use crate::{Laboratory, StabilityError, arithmetic};
 use glam::DVec3;
 use mica_render::View;
 use mica_render::scene::Camera;
 use mica_shaders::types::Operands;
 
-/// Mean radiance of a plane whose picture always shows as many flakes, over ten decades of distance.
+/// Mean radiance of a surface over ten decades of distance.
 ///
 /// # Errors
 /// Those of the device and the renderer.
 pub fn distance(laboratory: &mut Laboratory) -> Result<Sweep, StabilityError> {
     let distances = distances(laboratory.inputs(2, 8) as i32);
-    let truth = expected()?;
-    let gated = gated_moments(laboratory, &[truth.law])?[0].mean / exact_moments(truth.law).mean;
-    let mut points = Vec::new();
-    for distance in &distances {
-        points.push((*distance, radiance_seen(laboratory, seen_from(*distance))? / truth.radiance));
-    }
+    let mut over = |shown: Shown| -> Result<Vec<(f64, f64)>, StabilityError> {
+        let limit = limit(laboratory, shown)?;
+        let ratio = |distance: &f64| Ok((*distance, radiance_seen(laboratory, shown, seen_from(*distance))? / limit));
+        distances.iter().map(ratio).collect()
+    };
+    let points = over(EVERY_FLAKE)?;
     Ok(Sweep {
         name: "distance".to_owned(),
         title: "Ten decades of distance".to_owned(),
         x: log("distance in metres"),
-        y: linear("mean radiance / mean of the BRDF over the cone"),
+        y: linear("mean radiance / that of infinitely many flakes"),
         worst: greatest(points.iter().map(|(_, ratio)| (ratio - 1.0).abs())),
         series: vec![
             Series { name: "every flake".to_owned(), points },
-            Series {
-                name: "as many, counted by a gate and a rounded normal number".to_owned(),
-                points: distances.iter().map(|distance| (*distance, gated)).collect(),
-            },
+            Series { name: "Deliot and Belcour 2023 as printed".to_owned(), points: over(GATED)? },
         ],
-        claim: "Mean radiance is flat within .5 % from 1e-4 to 1e6 metres.".to_owned(),
+        claim: "Mean radiance of a surface is flat within .5 % from 1e-4 to 1e6 metres.".to_owned(),
         tolerance: 5e-3,
     })
 }

@@ -1,14 +1,14 @@
 //! `mica accuracy --counts`: the law of the count, method by method, from a tenth of a flake in a footprint to 100,000.
 
-use crate::args::AccuracyArgs;
+use super::AccuracyArgs;
 use crate::error::{Failure, INTERRUPTED};
 use crate::interrupt::Interrupt;
 use crate::output::{self, Destination};
 use crate::progress::Progress;
-use crate::session::{cache, executor, validation};
+use crate::session::{cache, device, executor};
 use crate::table::{Column, table};
 use mica_accuracy::{Condition, CountErrors, CountLaw, Stage, StageError};
-use mica_gpu::{Device, DeviceOptions, Executor};
+use mica_gpu::Executor;
 use mica_render::{Cache, MethodInfo};
 use serde_json::{Value as Json, json};
 use std::path::Path;
@@ -42,10 +42,10 @@ pub fn counts(
     progress: &mut Progress,
 ) -> Result<(), Failure> {
     let mut lines = args.output.as_deref().map(Lines::create).transpose()?;
-    let device = Device::new(&DeviceOptions { select: args.device.clone(), validation: validation(args.validation) })?;
+    let device = device(&args.device)?;
     let described = json!({ "name": device.info().name, "driver": device.info().driver });
-    let kept = cache(args.cache.as_deref(), args.no_cache);
-    let mut executor = executor(device, kept.as_ref(), args.memory)?;
+    let kept = cache(&args.device);
+    let mut executor = executor(device, kept.as_ref(), args.device.memory)?;
     interrupt.defer();
     let mut rows: Vec<Row> = Vec::new();
     let mut failed = None;

@@ -1,16 +1,15 @@
 //! `mica accuracy --exactness`: what each exactness costs on its own, error against nanoseconds.
 
-use crate::args::AccuracyArgs;
+use super::AccuracyArgs;
 use crate::error::{Failure, INTERRUPTED};
 use crate::interrupt::Interrupt;
 use crate::output;
 use crate::progress::Progress;
-use crate::session::{cache, executor, validation};
+use crate::session::{cache, device, executor};
 use crate::study::{Lines, machine};
 use crate::table::{Column, table};
 use mica_accuracy::Machine;
 use mica_accuracy::exactness::{Chart, EXACTNESS_SCHEMA, Effort, ExactnessError, ExactnessLine, measure};
-use mica_gpu::{Device, DeviceOptions};
 use std::path::Path;
 
 /// The file of a study's folder.
@@ -25,10 +24,10 @@ pub fn exactness(
     progress: &mut Progress,
 ) -> Result<(), Failure> {
     let mut lines = args.output.as_deref().map(open).transpose()?;
-    let device = Device::new(&DeviceOptions { select: args.device.clone(), validation: validation(args.validation) })?;
+    let device = device(&args.device)?;
     let machine = machine(device.info(), "none");
-    let kept = cache(args.cache.as_deref(), args.no_cache);
-    let mut executor = executor(device, kept.as_ref(), args.memory)?;
+    let kept = cache(&args.device);
+    let mut executor = executor(device, kept.as_ref(), args.device.memory)?;
     let effort = if args.quick { Effort::QUICK } else { Effort::FULL };
     let there = lines.as_ref().filter(|_| !anew).map_or(&[][..], |lines| &lines.all);
     let wanted = wanted(&args.chart, there, &machine);

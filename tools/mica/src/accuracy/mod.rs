@@ -1,10 +1,12 @@
 //! `mica accuracy`: what methods show, against the truth and against each other.
 
+mod args;
 mod counts;
 mod exactness;
 mod sheet;
 
-use crate::args::AccuracyArgs;
+pub use args::AccuracyArgs;
+
 use crate::error::Failure;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;

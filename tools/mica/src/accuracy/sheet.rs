@@ -1,6 +1,7 @@
 //! `mica accuracy --sheet`: every method on every embedded scene, in one picture.
 
-use crate::args::{AccuracyArgs, SceneArgs};
+use super::AccuracyArgs;
+use crate::args::SceneArgs;
 use crate::error::{Failure, INTERRUPTED};
 use crate::interrupt::Interrupt;
 use crate::output::{self, Destination};
@@ -98,15 +99,7 @@ impl Sheet {
     }
 
     fn scene_args(&self, args: &AccuracyArgs, scene: &str) -> SceneArgs {
-        SceneArgs {
-            size: self.tile,
-            device: args.device.clone(),
-            memory: args.memory,
-            validation: args.validation,
-            cache: args.cache.clone(),
-            no_cache: args.no_cache,
-            ..SceneArgs::of(scene)
-        }
+        SceneArgs { size: self.tile, device: args.device.clone(), ..SceneArgs::of(scene) }
     }
 }
 

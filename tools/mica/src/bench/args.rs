@@ -1,6 +1,6 @@
 //! What `mica bench` is asked.
 
-use crate::args::size;
+use crate::args::{DeviceArgs, size};
 use crate::study::Lighting;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use std::path::PathBuf;
     lighting. The time of glints is that of a frame with them less that of the same frame without, in turns in one \
     run: processor time of the process where the device is the processor, timestamps of the device elsewhere. Figures \
     are medians over the rounds of three sittings, between which all other points of the place are timed; after ± (+a/-b where these differ by more than a third) stands what rounds and \
-    sittings differ by, and no less than 5 % of the frame. Tables are those a method makes anew when a setting changes, without the compilation of \
+    sittings differ by, and no less than 5 % of the frame; `at most` its upper end, where a time is no greater than its spread. Tables are those a method makes anew when a setting changes, without the compilation of \
     shaders."
 )]
 pub struct BenchArgs {
@@ -20,6 +20,10 @@ pub struct BenchArgs {
     /// ready, how many bytes it keeps, how many rays a second it answers, and how often the bodies disagree.
     #[arg(long, conflicts_with_all = ["method", "lighting"])]
     pub occlusion: bool,
+    /// What glints cost as they fill more of the screen, from none to all of it: a fixed part, and one that grows with the tiles that
+    /// show them. Of `--method`s, or of three.
+    #[arg(long, conflicts_with_all = ["occlusion", "paper", "lighting", "scene"])]
+    pub coverage: bool,
     /// The tables and figures of a paper for this implementation, with the paper's own numbers and hardware beside them:
     /// of Wang, Deng and Holzschuch 2020, Tables 1 to 3 and Figures 9 and 10, on shoe, snow and cloth up to 1920x1080.
     #[arg(long, value_enum, conflicts_with_all = ["occlusion", "method", "lighting"])]
@@ -50,19 +54,8 @@ pub struct BenchArgs {
     /// for each scene and body. `-` is stdout, in place of the table.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// A device, by its number or a part of its name or of its driver's name and version (see `mica doctor`). Default:
-    /// the best there is.
-    #[arg(long, value_name = "NAME|INDEX")]
-    pub device: Option<String>,
-    /// Most device memory to take, as in `mica render`.
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(16..=1 << 30))]
-    pub memory: Option<u64>,
-    /// Keeps pipelines there. Default: `mica` in the user's cache folder.
-    #[arg(long, value_name = "DIR", conflicts_with = "no_cache")]
-    pub cache: Option<PathBuf>,
-    /// Keeps nothing and uses nothing that was kept.
-    #[arg(long)]
-    pub no_cache: bool,
+    #[command(flatten)]
+    pub device: DeviceArgs,
     /// Prints neither table nor progress.
     #[arg(long)]
     pub quiet: bool,

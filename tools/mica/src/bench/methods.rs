@@ -3,11 +3,12 @@
 use super::BenchArgs;
 use crate::accuracy::chosen;
 use crate::args::SceneArgs;
-use crate::error::{Failure, INTERRUPTED};
+use crate::error::{Failure, INTERRUPTED, NO_DEVICE};
 use crate::interrupt::Interrupt;
 use crate::output;
 use crate::progress::Progress;
 use crate::scene_choice;
+use crate::spare::Spare;
 use crate::study::{Effort, LeftOut, Lines, OpenPlace, Stop, measure, rungs, sit_again, stops, table_of, unmeasured};
 use mica_accuracy::Point;
 use mica_render::{MethodInfo, Rung};
@@ -43,6 +44,7 @@ pub fn methods(args: &BenchArgs, interrupt: &Interrupt) -> Result<(), Failure> {
         to_stdout,
         lines,
         left_out: LeftOut::default(),
+        spare: Spare::default(),
         measured: 0,
     };
     interrupt.defer();
@@ -64,33 +66,42 @@ struct Bench<'a> {
     to_stdout: bool,
     lines: Option<Lines<Point>>,
     left_out: LeftOut,
+    spare: Spare,
     measured: usize,
 }
 
 impl Bench<'_> {
-    /// All points of a place. One that cannot be measured is reported, and the others go on.
+    /// All points of a place. One that cannot be measured is reported, and the others go on, unless the device is missing.
     fn stop(&mut self, stop: &Stop) -> Result<(), Failure> {
-        let BenchArgs { device, memory, cache, no_cache, .. } = self.args;
         let scene = SceneArgs {
             scene: stop.scene.clone(),
             size: stop.size,
-            device: device.clone(),
-            memory: *memory,
-            cache: cache.clone(),
-            no_cache: *no_cache,
+            device: self.args.device.clone(),
             ..SceneArgs::of("")
         };
         let mut open = None;
         let mut points = Vec::new();
-        for (index, (method, rung)) in self.rungs.clone().into_iter().enumerate() {
+        let mut ended = Ok(());
+        let mut next = 0;
+        while let Some((method, rung)) = self.rungs.get(next).copied() {
             if self.interrupt.requested() {
                 break;
             }
+            next += 1;
             // After a failure the place is opened anew, as frames may be lost with it.
             let place = match &mut open {
                 Some(place) => place,
                 none => match OpenPlace::open(&scene, stop.lighting, &mut self.progress) {
                     Ok(place) => none.insert(place),
+                    Err(failure) if self.spare.serves(&failure) => {
+                        next -= 1;
+                        continue;
+                    }
+                    // No other place has another.
+                    Err(failure) if failure.code == NO_DEVICE => {
+                        ended = Err(failure);
+                        break;
+                    }
                     Err(failure) => {
                         self.report(&stop.scene.display().to_string(), &failure);
                         break;
@@ -104,7 +115,7 @@ impl Bench<'_> {
                 continue;
             }
             let what = format!("{} by {}", place.place.scene, wanted.name());
-            let title = format!("{what} ({} of {})", index + 1, self.rungs.len());
+            let title = format!("{what} ({next} of {})", self.rungs.len());
             let (effort, interrupt) = (&self.effort, self.interrupt);
             match self.progress.during(&title, || measure(place, method, rung, None, effort, interrupt)) {
                 Ok(measured) => {
@@ -113,16 +124,26 @@ impl Bench<'_> {
                 }
                 Err(failure) if failure.code == INTERRUPTED => {}
                 Err(failure) => {
-                    self.report(&what, &failure);
                     open = None;
+                    if self.spare.serves(&failure) {
+                        next -= 1;
+                    } else {
+                        self.report(&what, &failure);
+                    }
                 }
             }
         }
-        if let Some(place) = &mut open {
+        while let Some(place) = &mut open {
             let (lines, around) = (&mut self.lines, (self.interrupt, &mut self.progress));
             let keep = |point: &Point| lines.as_mut().map_or(Ok(()), |lines| lines.renew(point.clone()));
-            let ended = sit_again(place, &mut points, &self.effort, around, keep)?;
-            if let Some(failure) = ended.filter(|failure| failure.code != INTERRUPTED) {
+            let cut_short = sit_again(place, &mut points, &self.effort, around, keep)?;
+            open = None;
+            let mut failed = cut_short.filter(|failure| failure.code != INTERRUPTED);
+            if failed.as_ref().is_some_and(|failure| self.spare.serves(failure)) {
+                let again = OpenPlace::open(&scene, stop.lighting, &mut self.progress);
+                (open, failed) = again.map_or_else(|failure| (None, Some(failure)), |place| (Some(place), None));
+            }
+            if let Some(failure) = failed {
                 self.report(&stop.scene.display().to_string(), &failure);
             }
         }
@@ -131,7 +152,7 @@ impl Bench<'_> {
             let message = format!("interrupted after {} points, which were kept", self.measured);
             return Err(Failure::with_code(INTERRUPTED, message));
         }
-        Ok(())
+        ended
     }
 
     fn keep(&mut self, point: Point) -> Result<(), Failure> {

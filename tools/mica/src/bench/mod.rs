@@ -2,6 +2,7 @@
 
 mod args;
 mod body;
+mod coverage;
 mod methods;
 mod occlusion;
 mod rays;
@@ -19,6 +20,7 @@ use args::Paper;
 pub fn bench(args: &BenchArgs, interrupt: &Interrupt) -> Result<(), Failure> {
     match args.paper {
         Some(Paper::Wdh20) => wdh20::wdh20(args, interrupt),
+        None if args.coverage => coverage::coverage(args, interrupt),
         None if args.occlusion => occlusion::occlusion(args, interrupt),
         None => methods::methods(args, interrupt),
     }

@@ -14,8 +14,9 @@ use crate::output::{self, Destination};
 use crate::progress::Progress;
 use crate::report::DeviceReport;
 use crate::scene_choice;
-use crate::session::{cache, executor};
-use mica_gpu::{Device, DeviceInfo, DeviceKind, DeviceOptions, Executor};
+use crate::session::{cache, device, executor};
+use crate::spare::Spare;
+use mica_gpu::{DeviceInfo, DeviceKind, Executor};
 use mica_render::scene::{Light, Mesh, Scene};
 use mica_render::{OcclusionBackend, Question, Update, View};
 use mica_shaders::types::{Ray, RayAnswer};
@@ -30,16 +31,17 @@ const WARMUP: u32 = 1;
 pub fn occlusion(args: &BenchArgs, interrupt: &Interrupt) -> Result<(), Failure> {
     let to_stdout = args.json.as_deref() == Some(Path::new("-"));
     let destination = args.json.as_deref().filter(|_| !to_stdout).map(Destination::check).transpose()?;
-    let device = Device::new(&DeviceOptions { select: args.device.clone(), ..DeviceOptions::default() })?;
+    let open = || device(&args.device);
+    let device = open()?;
     check_counts(args, device.info())?;
-    let kept = cache(args.cache.as_deref(), args.no_cache);
+    let kept = cache(&args.device);
     let mut bench = Bench {
         args,
         size: camera_size(args)?,
         offered: vec![OcclusionBackend::Bvh],
         not_offered: Vec::new(),
         on_processor: device.info().kind == DeviceKind::Cpu,
-        executor: executor(device.clone(), kept.as_ref(), args.memory)?,
+        executor: executor(device.clone(), kept.as_ref(), args.device.memory)?,
         progress: Progress::new(args.quiet),
         interrupt,
     };
@@ -57,13 +59,19 @@ pub fn occlusion(args: &BenchArgs, interrupt: &Interrupt) -> Result<(), Failure>
     };
     let mut lines = String::new();
     let (mut failed, mut cut_short) = (None, false);
+    let mut spare = Spare::default();
     interrupt.defer();
     for (index, scene) in scenes.iter().enumerate() {
         if interrupt.requested() {
             cut_short = true;
             break;
         }
-        let report = match bench.scene(scene) {
+        let mut done = bench.scene(scene);
+        if done.as_ref().is_err_and(|failure| spare.serves(failure)) {
+            bench.executor = executor(open()?, kept.as_ref(), args.device.memory)?;
+            done = bench.scene(scene);
+        }
+        let report = match done {
             Ok(Some(report)) => report,
             Ok(None) => {
                 cut_short = true;

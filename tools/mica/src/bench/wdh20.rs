@@ -47,10 +47,10 @@ const THEIR_SCENES: [TheirScene; 3] = [
     TheirScene { name: "cloth", glints_ms: 4.4, frame_ms: 15.5, energy: 0.932, wang2018_min: 6.9, jakob_min: 9.0 },
 ];
 
-/// Bytes that stay on the device, by the first word of their name here: in the paper's Table 2, MB.
+/// Bytes that stay on the device, by how their names begin here: in the paper's Table 2, MB.
 const THEIR_MEMORY: [(&str, &str, f64); 4] = [
     ("quadtree", "quadtree", 256.0),
-    ("prefiltered environment", "prefilter ", 10.22),
+    ("prefiltered environment", "prefiltered", 10.22),
     ("probabilities accumulated over gamma", "dpf_accumulated", 5.7),
     ("probabilities of all roughnesses", "dpf", 46.7),
 ];
@@ -257,14 +257,7 @@ impl Paper<'_> {
     }
 
     fn open(&self, scene: &str, progress: &mut Progress) -> Result<OpenPlace, Failure> {
-        let args = SceneArgs {
-            size: self.size,
-            device: self.args.device.clone(),
-            memory: self.args.memory,
-            cache: self.args.cache.clone(),
-            no_cache: self.args.no_cache,
-            ..SceneArgs::of(scene)
-        };
+        let args = SceneArgs { size: self.size, device: self.args.device.clone(), ..SceneArgs::of(scene) };
         OpenPlace::open(&args, Lighting::Own, progress)
     }
 

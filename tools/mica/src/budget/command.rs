@@ -1,6 +1,6 @@
 //! The command line that shows a view again, with the method and settings that were chosen for it.
 
-use crate::args::{CameraChoice, SceneArgs};
+use crate::args::{CameraChoice, DeviceArgs, SceneArgs};
 use crate::study::shell_word;
 use clap::ValueEnum;
 use glam::DVec3;
@@ -29,11 +29,7 @@ pub fn options(args: &SceneArgs) -> String {
         camera,
         exposure,
         occlusion,
-        device,
-        memory: _,
-        validation: _,
-        cache: _,
-        no_cache: _,
+        device: DeviceArgs { device, memory: _, validation: _, cache: _, no_cache: _ },
     } = args;
     let mut words = vec![format!("--size {width}x{height}")];
     words.extend(set.iter().map(|change| format!("--set {}", shell_word(&change.to_string()))));

@@ -7,7 +7,8 @@ use mica_accuracy::{Goal, Metric};
 #[derive(Debug, Args)]
 pub struct BudgetArgs {
     /// Chooses the most accurate method and settings whose glints take no more than so many milliseconds of a frame: the
-    /// median of a frame of one sample less the same frame without glints, as the rest is not theirs. Measures this view
+    /// median of a frame of one sample less the same frame without glints, as the rest is not theirs, and its upper end
+    /// where it is no greater than its spread, since that may be noise. Measures this view
     /// on this device once, which takes minutes on a processor, and keeps the figures in the cache. Ctrl-C keeps what
     /// was measured until then. `smooth`, without any sparkle, counts as a method too: a small budget may choose it. With
     /// --method, chooses among the settings of that method.

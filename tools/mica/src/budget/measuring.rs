@@ -11,7 +11,7 @@ use crate::progress::Progress;
 use crate::session::{Session, Wanted};
 use crate::study::{self, Effort, OpenPlace, Reference};
 use mica_accuracy::exactness::Clock;
-use mica_accuracy::{Cost, Errors, Estimate, Goal, Metric, Place, Point, choose};
+use mica_accuracy::{Cost, Errors, Estimate, Goal, Metric, Place, Point, Weight, choose};
 use mica_gpu::Timing;
 use mica_render::{MethodInfo, Rung, View};
 use std::collections::BTreeSet;
@@ -175,7 +175,8 @@ impl<'a> Measuring<'a> {
 
     /// Whether a point is surely cheaper than another, whose times are those of two frames, and more accurate.
     fn beats(&self, point: &Point, other: &Point, metric: Metric) -> bool {
-        let error = |point: &Point| point.errors.as_ref().and_then(|errors| metric.of(errors)).map(|error| error.value);
+        let known = |point: &Point| point.errors.as_ref().and_then(|errors| metric.of(errors));
+        let error = |point: &Point| known(point).map(|error| Weight::of_error(error).value);
         let is_cheaper = self.is_timed(point) && point.cost.glint_ns() < self.least_ns(other);
         is_cheaper && error(point).zip(error(other)).is_some_and(|(error, other)| error <= other)
     }

@@ -151,8 +151,8 @@ fn interrupted(measured: usize, kept: &Kept) -> Failure {
 fn nothing_fits(wish: &Wish, nothing: &NothingFits) -> Failure {
     let metric = wish.metric;
     let of = |point: &Point| {
-        let error = point.errors.as_ref().and_then(|errors| metric.of(errors)).map_or(f64::NAN, |error| error.value);
-        let error = if error.is_finite() { format!(", {} error {error:.3}", metric.name()) } else { String::new() };
+        let error = point.errors.as_ref().and_then(|errors| metric.of(errors)).filter(|error| error.value.is_finite());
+        let error = error.map_or_else(String::new, |of| format!(", {} error {}", metric.name(), report::error(of)));
         format!("{} at {}{error}", point.name(), report::times(point.cost.glints, point.cost.frame))
     };
     let (found, advice) = match nothing {

@@ -4,7 +4,7 @@ use super::command;
 use super::goal::Wish;
 use super::measuring::Skipped;
 use crate::args::SceneArgs;
-use mica_accuracy::{Choice, Estimate, Goal, Metric, Point};
+use mica_accuracy::{Choice, Estimate, Goal, Metric, Point, Weight};
 use serde::Serialize;
 use serde_json::{Map, Value as Json};
 
@@ -42,7 +42,7 @@ pub struct StepReport {
     /// Of its ladder.
     pub rung: String,
     pub set: Map<String, Json>,
-    /// Median, least and greatest of a frame with glints less one without.
+    /// A frame with glints less one without: the median, within what rounds and sittings differ by.
     pub glint_ns: Estimate,
     /// The frame with glints.
     pub frame_ns: Estimate,
@@ -139,8 +139,7 @@ impl StepReport {
     }
 
     fn words(&self, metric: &str) -> String {
-        let error =
-            self.error.map_or_else(|| "unknown".to_owned(), |error| with_ends(error, |error| format!("{error:.3}")));
+        let error = self.error.map_or_else(|| "unknown".to_owned(), self::error);
         format!("{}: {}, expected error {metric} {error}", self.name, times(self.glint_ns, self.frame_ns))
     }
 
@@ -152,21 +151,71 @@ impl StepReport {
 
 /// What glints take, and their frame.
 pub fn times(glints: Estimate, frame: Estimate) -> String {
-    let ms = |ns: f64| format!("{:.3}", ns * 1e-6);
-    // A difference of two noisy frames: below 0 there is nothing.
-    let glints = if glints.low <= 0.0 {
-        format!("at most {} ms", ms(glints.high))
-    } else {
-        with_ends(glints, ms).replacen(' ', " ms ", 1)
-    };
-    format!("{glints} of a frame of {:.1} ms", frame.value * 1e-6)
+    let ms = glints.scaled(1e-6);
+    let (figure, ends) = words(ms, Weight::of_time(ms));
+    // Known by two frames alone, which have no spread.
+    let about = if ms.low == ms.high { "about " } else { "" };
+    format!("{about}{figure} ms{ends} of a frame of {:.1} ms", frame.value * 1e-6)
 }
 
-/// A figure with its lower and upper end, where these are known.
-fn with_ends(Estimate { value, low, high }: Estimate, figure: impl Fn(f64) -> String) -> String {
-    if low.is_finite() && high.is_finite() {
-        format!("{} ({} to {})", figure(value), figure(low), figure(high))
+/// An error with its interval.
+pub fn error(error: Estimate) -> String {
+    let (figure, ends) = words(error, Weight::of_error(error));
+    figure + &ends
+}
+
+/// A figure, and its lower and upper end behind it where these are known, all of them in as many digits as tell them apart.
+fn words(Estimate { value, low, high }: Estimate, weight: Weight) -> (String, String) {
+    let decimals = decimals_apart(&[value, low, high]);
+    let digits = |figure: f64| format!("{figure:.decimals$}");
+    if weight.is_at_most {
+        (format!("at most {}", digits(weight.value)), String::new())
+    } else if low.is_finite() && high.is_finite() && low < high {
+        (digits(value), format!(" ({} to {})", digits(low), digits(high)))
     } else {
-        figure(value)
+        (digits(value), String::new())
+    }
+}
+
+/// Decimals with which figures that differ are written differently: three, and more where these are not enough.
+fn decimals_apart(figures: &[f64]) -> usize {
+    const FEWEST: usize = 3;
+    const MOST: usize = 12;
+    let mut figures: Vec<f64> = figures.iter().copied().filter(|figure| figure.is_finite()).collect();
+    figures.sort_by(f64::total_cmp);
+    let are_apart = |decimals: &usize| {
+        let written = |figure: f64| format!("{figure:.decimals$}");
+        figures.windows(2).all(|pair| pair[0] == pair[1] || written(pair[0]) != written(pair[1]))
+    };
+    (FEWEST..MOST).find(are_apart).unwrap_or(MOST)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimate(low: f64, value: f64, high: f64) -> Estimate {
+        Estimate { value, low, high }
+    }
+
+    #[test]
+    fn figures_have_as_many_digits_as_tell_their_ends_apart() {
+        assert_eq!(error(estimate(0.1, 0.2, 0.3)), "0.200 (0.100 to 0.300)");
+        assert_eq!(error(estimate(0.20001, 0.20002, 0.20004)), "0.20002 (0.20001 to 0.20004)");
+        assert_eq!(error(estimate(0.0, 0.2, 0.3)), "at most 0.300");
+        assert_eq!(error(Estimate::exact(0.25)), "0.250");
+        assert_eq!(error(Estimate { value: 0.25, ..Estimate::UNKNOWN }), "0.250");
+    }
+
+    #[test]
+    fn times_say_what_is_known_of_them() {
+        let frame = Estimate::exact(20e6);
+        assert_eq!(times(estimate(1.9e6, 2e6, 2.2e6), frame), "2.000 ms (1.900 to 2.200) of a frame of 20.0 ms");
+        assert_eq!(times(estimate(0.1e6, 2e6, 3.9e6), frame), "at most 3.900 ms of a frame of 20.0 ms");
+        assert_eq!(times(Estimate::exact(2e6), frame), "about 2.000 ms of a frame of 20.0 ms");
+        assert_eq!(
+            times(estimate(1.99998e6, 2e6, 2.00002e6), frame),
+            "2.00000 ms (1.99998 to 2.00002) of a frame of 20.0 ms"
+        );
     }
 }

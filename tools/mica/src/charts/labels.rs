@@ -16,7 +16,7 @@ pub struct Label {
 }
 
 /// A rectangle by two corners.
-type Area = [[f64; 2]; 2];
+pub type Area = [[f64; 2]; 2];
 
 const SIZE: f64 = 11.5;
 /// From the baseline to the top of letters, and to their bottom.
@@ -90,13 +90,13 @@ fn candidates(label: &Label, wide: f64) -> impl Iterator<Item = (f64, [f64; 2])>
 }
 
 /// Pixels that two rectangles share.
-fn overlap(a: &Area, b: &Area) -> f64 {
+pub fn overlap(a: &Area, b: &Area) -> f64 {
     let side = |k: usize| (a[1][k].min(b[1][k]) - a[0][k].max(b[0][k])).max(0.0);
     side(0) * side(1)
 }
 
 /// Pixels of a line in a rectangle, to a few pixels.
-fn length_in(area: &Area, line: &[[f64; 2]]) -> f64 {
+pub fn length_in(area: &Area, line: &[[f64; 2]]) -> f64 {
     const STEP: f64 = 3.0;
     let inside = |[x, y]: [f64; 2]| (area[0][0]..=area[1][0]).contains(&x) && (area[0][1]..=area[1][1]).contains(&y);
     line.windows(2)

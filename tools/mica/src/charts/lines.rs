@@ -50,13 +50,7 @@ impl Lines {
         let around = if self.linear_up { Axis::linear_around } else { Axis::around };
         let y = around(all().map(|point| point[1]), [BOTTOM, TOP]);
         let (Some(x), Some(y)) = (x, y) else {
-            drawing.text(
-                [LEFT, TOP + 30.0],
-                Anchor::Start,
-                12.0,
-                Ink::Aside,
-                "Nothing was measured that could be drawn.",
-            );
+            drawing.say_nothing([LEFT, TOP + 30.0]);
             return drawing;
         };
         for tick in x.ticks() {

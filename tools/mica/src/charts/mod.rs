@@ -3,6 +3,7 @@
 mod axis;
 mod bars;
 mod facets;
+mod floor;
 mod labels;
 mod lines;
 mod palette;
@@ -160,6 +161,11 @@ impl Drawing {
     pub fn rectangle(&mut self, from: [f64; 2], to: [f64; 2], fill: Ink) {
         let points = vec![from, [to[0], from[1]], to, [from[0], to[1]]];
         self.shapes.push(Shape::Line { points, closed: true, fill: Some(fill), stroke: None });
+    }
+
+    /// In place of a chart without any points.
+    pub fn say_nothing(&mut self, at: [f64; 2]) {
+        self.text(at, Anchor::Start, 12.0, Ink::Aside, "Nothing was measured that could be drawn.");
     }
 
     /// Words.

@@ -1,10 +1,11 @@
 //! Error against time: each method's rungs, which of them nothing beats, and what no method can do better than.
 
 use super::axis::Axis;
-use super::labels::{Label, place};
+use super::floor;
+use super::labels::{Area, Label, place};
 use super::text::width;
 use super::{Anchor, Drawing, Ink, Look, Shape, Stroke, line, three_digits};
-use mica_accuracy::{Estimate, front};
+use mica_accuracy::{Estimate, Weight, front};
 
 /// What a chart of error against time shows.
 #[derive(Clone, Debug)]
@@ -68,6 +69,34 @@ struct Drawn<'a> {
     is_front: bool,
 }
 
+impl Drawn<'_> {
+    /// The area of its marker; radii as in [`Frame`].
+    fn around(&self, [large, small]: [f64; 2]) -> Area {
+        let radius = if self.is_front { large + 1.0 } else { small };
+        [self.at.map(|side| side - radius), self.at.map(|side| side + radius)]
+    }
+
+    /// From end to end of what is known of its time and of its error, where that has two ends and no marker stands at one.
+    fn bars(&self, Frame { x, y, .. }: &Frame) -> Vec<Vec<[f64; 2]>> {
+        let [time, error] = self.mark.weights();
+        let mut bars = Vec::new();
+        for (figure, weight, axis, along) in [(self.mark.time, time, x, 0), (self.mark.error, error, y, 1)] {
+            if !weight.is_at_most && weight.value > 0.0 && figure.low.is_finite() && figure.high.is_finite() {
+                bars.push(
+                    [figure.low, figure.high]
+                        .map(|value| {
+                            let mut end = self.at;
+                            end[along] = axis.within(value);
+                            end
+                        })
+                        .to_vec(),
+                );
+            }
+        }
+        bars
+    }
+}
+
 const HEIGHT: f64 = 460.0;
 const WIDTH: f64 = 760.0;
 const LEFT: f64 = 66.0;
@@ -81,24 +110,28 @@ const MOST_LABELS: usize = 9;
 /// How opaque is what the front beats.
 const PALE: f64 = 0.5;
 
-/// Where a figure can be told from 0, itself; else the upper end of its interval, below which it lies, or 0.
-pub fn shown(figure: Estimate) -> f64 {
-    let shown = if is_bound(figure) { figure.high } else { figure.value };
-    // Not `max`, which makes a number of what is none.
-    if shown < 0.0 { 0.0 } else { shown }
-}
+impl Mark {
+    /// What stands for its time and for its error.
+    pub fn weights(&self) -> [Weight; 2] {
+        [Weight::of_time(self.time), Weight::of_error(self.error)]
+    }
 
-/// An interval that is not known (NaN) bounds nothing.
-fn is_bound(figure: Estimate) -> bool {
-    figure.low <= 0.0 || figure.value <= 0.0
+    /// Where it is drawn: time and error.
+    fn shown(&self) -> [f64; 2] {
+        self.weights().map(|weight| weight.value)
+    }
+
+    fn can_be_drawn(&self) -> bool {
+        self.shown().iter().all(|at| at.is_finite() && *at < 1e30)
+    }
 }
 
 impl Scatter {
     /// The keys of the marks that nothing beats, the fastest first.
     pub fn front(&self) -> Vec<&str> {
         let marks: Vec<&Mark> =
-            self.series.iter().flat_map(|series| &series.marks).filter(|m| can_be_drawn(m)).collect();
-        let points: Vec<(f64, f64)> = marks.iter().map(|mark| (shown(mark.time), shown(mark.error))).collect();
+            self.series.iter().flat_map(|series| &series.marks).filter(|m| m.can_be_drawn()).collect();
+        let points: Vec<(f64, f64)> = marks.iter().map(|mark| mark.shown().into()).collect();
         front(&points).into_iter().filter_map(|index| Some(marks.get(index)?.key.as_str())).collect()
     }
 
@@ -110,13 +143,7 @@ impl Scatter {
         let x = Axis::around(self.times(), [LEFT, right]);
         let y = Axis::around(self.errors().chain(self.floor_in_sight()), [bottom, TOP]);
         let (Some(x), Some(y)) = (x, y) else {
-            drawing.text(
-                [LEFT, TOP + 30.0],
-                Anchor::Start,
-                12.0,
-                Ink::Aside,
-                "Nothing was measured that could be drawn.",
-            );
+            drawing.say_nothing([LEFT, TOP + 30.0]);
             return drawing;
         };
         let area = [[LEFT, TOP], [right, bottom]];
@@ -129,17 +156,17 @@ impl Scatter {
     }
 
     fn marks(&self) -> impl Iterator<Item = &Mark> {
-        self.series.iter().flat_map(|series| &series.marks).filter(|mark| can_be_drawn(mark))
+        self.series.iter().flat_map(|series| &series.marks).filter(|mark| mark.can_be_drawn())
     }
 
     /// What the axis of time has to hold.
     pub fn times(&self) -> impl Iterator<Item = f64> {
-        self.marks().map(|mark| shown(mark.time))
+        self.marks().map(|mark| mark.shown()[0])
     }
 
     /// What the axis of error has to hold.
     pub fn errors(&self) -> impl Iterator<Item = f64> {
-        self.marks().map(|mark| shown(mark.error))
+        self.marks().map(|mark| mark.shown()[1])
     }
 
     /// The floor is seen where it is, if that is not so far off that nothing else could be told apart.
@@ -154,8 +181,8 @@ impl Scatter {
         let chosen = self.front();
         let mut drawn: Vec<Drawn<'_>> = Vec::new();
         for (series, one) in self.series.iter().enumerate() {
-            drawn.extend(one.marks.iter().filter(|mark| can_be_drawn(mark)).map(|mark| {
-                let (time, error) = (shown(mark.time), shown(mark.error));
+            drawn.extend(one.marks.iter().filter(|mark| mark.can_be_drawn()).map(|mark| {
+                let [time, error] = mark.shown();
                 let is_front = chosen.contains(&mark.key.as_str());
                 Drawn { series, mark, time, error, at: [x.within(time), y.within(error)], is_front }
             }));
@@ -179,7 +206,13 @@ impl Scatter {
                 drawing.shapes.push(self.point(one, frame));
             }
         }
-        let taken = floor.map(|at| draw_floor_words(drawing, at, *area));
+        let taken = floor.map(|at| {
+            let markers: Vec<Area> = drawn.iter().map(|one| one.around(frame.radii)).collect();
+            let mut lines: Vec<Vec<[f64; 2]>> = drawn.iter().flat_map(|one| one.bars(frame)).collect();
+            lines.extend((0..self.series.len()).map(|series| ladder(drawn.iter().filter(|one| one.series == series))));
+            lines.push(steps.clone());
+            floor::draw_words(drawing, at, *area, &markers, &lines)
+        });
         self.draw_labels(drawing, &drawn, frame, steps, taken);
         let mut on_front: Vec<&Drawn<'_>> = drawn.iter().filter(|one| one.is_front).collect();
         on_front.sort_by(|a, b| a.time.total_cmp(&b.time));
@@ -190,39 +223,32 @@ impl Scatter {
         self.series.get(series).map_or(Ink::Aside, |series| Ink::Own(series.look.colour, opacity))
     }
 
-    /// The thin line that joins the rungs of a method, in their order of time.
-    fn draw_ladder<'a>(&self, drawing: &mut Drawing, rungs: impl Iterator<Item = &'a Drawn<'a>>) {
-        let mut rungs: Vec<&Drawn<'_>> = rungs.collect();
-        rungs.sort_by(|a, b| a.time.total_cmp(&b.time).then(b.error.total_cmp(&a.error)));
-        let points: Vec<[f64; 2]> = rungs.iter().map(|rung| rung.at).collect();
-        if let [first, _, ..] = rungs.as_slice() {
-            let opacity = if rungs.iter().any(|rung| rung.is_front) { 0.75 } else { 0.35 };
-            drawing.shapes.extend(long_line(&points, Stroke::solid(self.colour(first.series, opacity), 1.1)));
+    /// The thin line that joins the rungs of a method.
+    fn draw_ladder<'a>(&self, drawing: &mut Drawing, rungs: impl Iterator<Item = &'a Drawn<'a>> + Clone) {
+        if let Some(first) = rungs.clone().next() {
+            let opacity = if rungs.clone().any(|rung| rung.is_front) { 0.75 } else { 0.35 };
+            drawing.shapes.extend(long_line(&ladder(rungs), Stroke::solid(self.colour(first.series, opacity), 1.1)));
         }
     }
 
-    fn point(&self, drawn: &Drawn<'_>, Frame { x, y, radii, .. }: &Frame) -> Shape {
+    fn point(&self, drawn: &Drawn<'_>, frame: &Frame) -> Shape {
         let Drawn { series, mark, at, is_front, .. } = drawn;
         let Some(look) = self.series.get(*series).map(|series| series.look) else {
             return line(&[], Stroke::solid(Ink::Aside, 0.0));
         };
         let opacity = if *is_front { 1.0 } else { PALE };
         let ink = Ink::Own(look.colour, opacity);
-        let radius = radii[usize::from(!*is_front)];
+        let radius = frame.radii[usize::from(!*is_front)];
         let bars = Stroke::solid(ink, if *is_front { 1.4 } else { 0.8 });
         let mut shapes = Vec::new();
-        for (figure, axis, along) in [(mark.time, x, 0), (mark.error, y, 1)] {
-            let end = |value: f64| if along == 0 { [axis.within(value), at[1]] } else { [at[0], axis.within(value)] };
-            if shown(figure) == 0.0 {
-                // Where it is: there is nothing less.
-            } else if is_bound(figure) {
+        let [time, error] = mark.weights();
+        shapes.extend(drawn.bars(frame).iter().filter_map(|bar| long_line(bar, bars)));
+        for (along, weight) in [time, error].into_iter().enumerate() {
+            if weight.is_at_most {
                 shapes.extend(arrow(*at, along, radius, bars));
-            } else if figure.low.is_finite() && figure.high.is_finite() {
-                shapes.extend(long_line(&[end(figure.low), end(figure.high)], bars));
             }
         }
-        let is_at_most = |figure: Estimate| is_bound(figure) && shown(figure) > 0.0;
-        let is_open = is_at_most(mark.time) || is_at_most(mark.error);
+        let is_open = time.is_at_most || error.is_at_most;
         let outline = if *is_front { Stroke::solid(Ink::Words, 1.8) } else { Stroke::solid(ink, 1.2) };
         // Paper first: lines do not shine through what is pale.
         shapes.push(look.mark(*at, radius, Some(Ink::Paper), None));
@@ -231,16 +257,16 @@ impl Scatter {
             (false, true) => look.mark(*at, radius, Some(ink), Some(outline)),
             (false, false) => look.mark(*at, radius, Some(ink), None),
         });
-        let at_most = |figure: Estimate| if is_at_most(figure) { "at most " } else { "" };
+        let at_most = |weight: Weight| if weight.is_at_most { "at most " } else { "" };
         let title = format!(
             "{}: {} {}{}, {} {}{}{}{}{}",
             mark.name,
             self.time,
-            at_most(mark.time),
-            three_digits(drawn.time),
+            at_most(time),
+            three_digits(time.value),
             self.error,
-            at_most(mark.error),
-            three_digits(drawn.error),
+            at_most(error),
+            three_digits(error.value),
             if *is_front { "; on the front" } else { "" },
             if mark.what.is_empty() { "" } else { ". " },
             mark.what,
@@ -254,14 +280,10 @@ impl Scatter {
         drawn: &[Drawn<'_>],
         frame: &Frame,
         steps: Vec<[f64; 2]>,
-        more: Option<[[f64; 2]; 2]>,
+        more: Option<Area>,
     ) {
         let [large, small] = frame.radii;
-        let around = |one: &Drawn<'_>| {
-            let radius = if one.is_front { large + 1.0 } else { small };
-            [one.at.map(|side| side - radius), one.at.map(|side| side + radius)]
-        };
-        let taken: Vec<_> = drawn.iter().map(around).chain(more).collect();
+        let taken: Vec<Area> = drawn.iter().map(|one| one.around(frame.radii)).chain(more).collect();
         let on_front = || drawn.iter().filter(|one| one.is_front);
         let is_crowded = on_front().count() > MOST_LABELS;
         let is_best = |one: &Drawn<'_>| on_front().all(|other| other.series != one.series || other.error >= one.error);
@@ -281,7 +303,7 @@ impl Scatter {
             })
             .collect();
         labels.sort_by(|a, b| a.at[0].total_cmp(&b.at[0]));
-        let bars = drawn.iter().filter(|one| one.is_front && !is_bound(one.mark.error)).map(|one| {
+        let bars = drawn.iter().filter(|one| one.is_front && !one.mark.weights()[1].is_at_most).map(|one| {
             let half = 14.0;
             vec![[one.at[0], one.at[1] - half], [one.at[0], one.at[1] + half]]
         });
@@ -324,11 +346,11 @@ impl Scatter {
     }
 }
 
-fn can_be_drawn(mark: &Mark) -> bool {
-    [mark.time, mark.error].iter().all(|figure| {
-        let at = shown(*figure);
-        at.is_finite() && at < 1e30
-    })
+/// Where the rungs of a method are, in their order of time.
+fn ladder<'a>(rungs: impl Iterator<Item = &'a Drawn<'a>>) -> Vec<[f64; 2]> {
+    let mut rungs: Vec<&Drawn<'_>> = rungs.collect();
+    rungs.sort_by(|a, b| a.time.total_cmp(&b.time).then(b.error.total_cmp(&a.error)));
+    rungs.iter().map(|rung| rung.at).collect()
 }
 
 fn draw_paper(drawing: &mut Drawing, frame: &Frame, steps: &[[f64; 2]]) {
@@ -386,16 +408,6 @@ fn steps(drawn: &[Drawn<'_>], [[_, top], [right, _]]: [[f64; 2]; 2]) -> Vec<[f64
         points.push([right, height]);
     }
     points
-}
-
-/// Says what the floor is, over what lies there. Returns the area of the words.
-fn draw_floor_words(drawing: &mut Drawing, at: f64, [_, [right, bottom]]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
-    let words = "floor: the reference with other flakes";
-    let y = if at + 17.0 < bottom { at + 13.0 } else { at - 5.0 };
-    let area = [[right - 8.0 - width(words, 10.5, false), y - 9.0], [right - 4.0, y + 3.0]];
-    drawing.rectangle(area[0], area[1], Ink::Veil);
-    drawing.text([right - 6.0, y], Anchor::End, 10.5, Ink::Aside, words);
-    area
 }
 
 /// A short arrow from a marker towards less, along x or y.
@@ -469,8 +481,10 @@ mod tests {
     fn what_cannot_be_told_from_nothing_is_open_at_the_edge_of_its_spread() {
         let scatter = chart(vec![
             mark("bound", (-1.0, 0.2, 2.0), (0.4, 0.5, 0.6)),
+            mark("no faster", (0.1, 1.5, 2.9), (0.5, 0.6, 0.7)),
             mark("sure", (9.0, 10.0, 11.0), (0.09, 0.1, 0.11)),
         ]);
+        assert_eq!(scatter.front(), ["bound", "sure"], "a spread that just does not reach 0 wins nothing");
         let drawing = scatter.draw();
         let found = points(&drawing);
         let bound = found.iter().find(|point| point.0 == "bound").expect("a point");

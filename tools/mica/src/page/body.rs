@@ -65,7 +65,9 @@ const FURTHER_TERMS: [(&str, &str); 5] = [
     (
         "front",
         "The points that nothing beats: no other is both at least as fast and at least as accurate. Bold in charts, joined \
-         by steps; what lies above the steps is beaten.",
+         by steps; what lies above the steps is beaten. A time counts as its median, and as its upper end if it is no greater \
+         than its spread from end to end; an error counts as itself, and as its upper end if its interval reaches 0. So nothing wins by noise. \
+         `mica render --budget-ms` and `--target-error` choose by the same rule.",
     ),
     (
         "glints",
@@ -74,11 +76,13 @@ const FURTHER_TERMS: [(&str, &str); 5] = [
     ),
     (
         "intervals",
-        "Of errors: 95 % by bootstrap over tiles of 16 by 16 pixels. Of times: the least and the greatest of the rounds.",
+        "Of errors: 95 % by bootstrap over tiles of 16 by 16 pixels. Of times: from the least to the greatest of all rounds, and \
+         to either side at least as far as sittings of one point lie apart for nine tenths of the points of the place, and 5 %.",
     ),
     (
         "open markers",
-        "What cannot be told from 0 is drawn at the upper end of its interval, open, with an arrow towards less.",
+        "What may be noise (a time no greater than its spread, an error whose interval reaches 0) is drawn at the upper end \
+         of its interval, open, with an arrow towards less: it is at most that.",
     ),
     (
         "floor",

@@ -2,13 +2,21 @@
 
 use crate::charts::three_digits;
 use crate::table::bytes;
-use mica_accuracy::{Errors, Estimate, Metric, Point};
+use mica_accuracy::{Errors, Estimate, Metric, Point, Weight};
 
 /// A figure that pages show of every point.
 pub struct Figure {
     pub name: &'static str,
     pub meaning: &'static str,
-    of: fn(&Point) -> Option<Estimate>,
+    of: fn(&Point) -> Option<Shown>,
+}
+
+/// A figure as pages show it.
+#[derive(Clone, Copy)]
+pub struct Shown {
+    pub estimate: Estimate,
+    /// Whether noise may be all of it, so that its upper end is all that is known.
+    pub is_at_most: bool,
 }
 
 const MS: f64 = 1e-6;
@@ -17,19 +25,19 @@ const MS: f64 = 1e-6;
 pub const FIGURES: [Figure; 13] = [
     Figure {
         name: "glint time, ms",
-        meaning: "Frames with glints less frames without, alternating in one run: the median of the rounds, and the least \
-                  and greatest. May be below 0 within its spread.",
-        of: |point| Some(scaled(point.cost.glints, MS)),
+        meaning: "Frames with glints less frames without, alternating in one run: the median of the rounds, and how far rounds \
+                  and sittings spread. A median that is no greater than its spread may be noise: all that is known is the upper end.",
+        of: |point| Some(of_glints(point, scaled(point.cost.glints, MS))),
     },
     Figure {
         name: "frame, ms",
         meaning: "The whole frame with glints, its passes free to overlap.",
-        of: |point| Some(scaled(point.cost.frame, MS)),
+        of: |point| Some(certain(scaled(point.cost.frame, MS))),
     },
     Figure {
         name: "time factor",
         meaning: "The frame with glints over the frame without, in each round.",
-        of: |point| Some(point.cost.ratio),
+        of: |point| Some(factor(point)),
     },
     Figure {
         name: "W1",
@@ -83,13 +91,13 @@ pub const FIGURES: [Figure; 13] = [
     Figure {
         name: "tables, ms",
         meaning: "Making the tables anew when a setting or the environment changes; not part of a frame.",
-        of: |point| Some(Estimate::exact(point.cost.tables * MS)),
+        of: |point| Some(certain(Estimate::exact(point.cost.tables * MS))),
     },
 ];
 
 impl Figure {
     /// The figure of a point; none where it was not measured.
-    pub fn of(&self, point: &Point) -> Option<Estimate> {
+    pub fn of(&self, point: &Point) -> Option<Shown> {
         (self.of)(point)
     }
 }
@@ -112,8 +120,44 @@ pub const FURTHER: [(&str, &str); 4] = [
     ("clock", "Timestamps of the GPU, or processor time of the process where the device is the processor."),
 ];
 
-fn error(point: &Point, of: impl Fn(&Errors) -> Option<Estimate>) -> Option<Estimate> {
-    of(point.errors.as_ref()?)
+impl Shown {
+    /// The number that is shown, and by which rows are sorted.
+    pub fn number(&self) -> f64 {
+        if self.is_at_most { self.estimate.high } else { self.estimate.value }
+    }
+
+    /// It in words, without its interval.
+    pub fn words(&self) -> String {
+        let number = three_digits(self.number());
+        if self.is_at_most { format!("at most {number}") } else { number }
+    }
+
+    /// The same with its interval.
+    pub fn with_interval(&self) -> String {
+        let Estimate { value, low, high } = self.estimate;
+        if !self.is_at_most {
+            return with_interval(self.estimate);
+        }
+        format!("{} [{}, {}; median {}]", self.words(), three_digits(low), three_digits(high), three_digits(value))
+    }
+}
+
+/// A frame with glints over one without.
+pub fn factor(point: &Point) -> Shown {
+    of_glints(point, point.cost.ratio)
+}
+
+/// What frames with glints say of these.
+fn of_glints(point: &Point, estimate: Estimate) -> Shown {
+    Shown { estimate, is_at_most: Weight::of_time(point.cost.glints).is_at_most }
+}
+
+fn certain(estimate: Estimate) -> Shown {
+    Shown { estimate, is_at_most: false }
+}
+
+fn error(point: &Point, of: impl Fn(&Errors) -> Option<Estimate>) -> Option<Shown> {
+    of(point.errors.as_ref()?).map(certain)
 }
 
 pub fn scaled(estimate: Estimate, by: f64) -> Estimate {
@@ -137,5 +181,22 @@ pub const fn tab(metric: Metric) -> &'static str {
         Metric::Flip => "FLIP",
         Metric::HdrFlip => "HDR-FLIP",
         Metric::Flicker => "Flicker",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_may_be_noise_is_shown_as_its_upper_end() {
+        let estimate = Estimate { value: 5.9, low: -2.0, high: 13.9 };
+        let noise = Shown { estimate, is_at_most: true };
+        assert_eq!((noise.number(), noise.words()), (13.9, "at most 13.9".to_owned()));
+        assert_eq!(noise.with_interval(), "at most 13.9 [-2, 13.9; median 5.9]");
+        assert_eq!(
+            (certain(estimate).words(), certain(estimate).with_interval()),
+            ("5.9".into(), "5.9 [-2, 13.9]".into())
+        );
     }
 }

@@ -180,12 +180,12 @@ impl<'a> Section<'a> {
             html.tags(format_args!("<a href=\"#{}/{slug}\">", self.slug)).words(&point.rung).tag("</a></td><td>");
             html.words(&point.claim).tag("</td>");
             for figure in &FIGURES {
-                match figure.of(point).filter(|estimate| estimate.value.is_finite()) {
-                    Some(estimate) => html.tags(format_args!(
+                match figure.of(point).filter(|shown| shown.number().is_finite()) {
+                    Some(shown) => html.tags(format_args!(
                         "<td data-value=\"{}\" title=\"{}\">{}</td>",
-                        estimate.value,
-                        escaped(&with_interval(estimate)),
-                        three_digits(estimate.value)
+                        shown.number(),
+                        escaped(&shown.with_interval()),
+                        shown.words()
                     )),
                     None => html.tag("<td>–</td>"),
                 };
@@ -219,7 +219,7 @@ impl Entry<'_> {
         let mut figures: Vec<[String; 3]> = FIGURES
             .iter()
             .filter_map(|figure| {
-                Some([figure.name.to_owned(), with_interval(figure.of(point)?), figure.meaning.to_owned()])
+                Some([figure.name.to_owned(), figure.of(point)?.with_interval(), figure.meaning.to_owned()])
             })
             .collect();
         let meanings = super::figures::FURTHER.map(|(_, meaning)| meaning);

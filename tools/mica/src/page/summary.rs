@@ -1,9 +1,10 @@
 //! What a study says at one look: which methods are on the front of which place.
 
+use super::figures::{Shown, factor};
 use super::html::Html;
 use super::place::{Entry, Section, lighting, size};
 use crate::charts::{Use, escaped, look_of, svg, swatch, three_digits};
-use mica_accuracy::Metric;
+use mica_accuracy::{Metric, Weight};
 use mica_render::METHODS;
 
 /// A table of methods and places.
@@ -12,7 +13,7 @@ pub fn summary(sections: &[Section<'_>]) -> String {
     html.tag(
         "<section id=\"summary\"><h2>At a glance</h2><p><span class=\"dot on\" aria-hidden=\"true\"></span> on the front: \
          nothing that was measured is both faster and nearer to the reference, by the distribution of its pixels (W1). The \
-         number is the time factor of a frame: with glints over without.</p><div class=\"scroll\"><table \
+         number is the time factor of a frame: with glints over without, at most so much where that may be noise.</p><div class=\"scroll\"><table \
          class=\"matrix\"><thead><tr><td></td>",
     );
     for section in sections {
@@ -57,18 +58,13 @@ fn cell(html: &mut Html, section: &Section<'_>, method: &str) {
         (true, _) => ("beaten", "beaten", &rungs),
         (false, _) => ("front", "on the front", &on_front),
     };
-    let error = |entry: &Entry<'_>| entry.point.errors.as_ref().map_or(f64::INFINITY, |errors| errors.w1.value);
-    let Some(best) = shown.iter().min_by(|a, b| error(a).total_cmp(&error(b))) else { return };
-    let factors: Vec<f64> =
-        shown.iter().map(|entry| entry.point.cost.ratio.value).filter(|factor| factor.is_finite()).collect();
-    let least = factors.iter().copied().fold(f64::INFINITY, f64::min);
-    let most = factors.iter().copied().fold(0.0, f64::max);
-    let (least_words, most_words) = (factor_words(least), factor_words(most));
-    let words = match factors.as_slice() {
-        [] => "–".to_owned(),
-        _ if least_words == most_words => format!("×{least_words}"),
-        _ => format!("×{least_words} to {most_words}"),
+    let error = |entry: &Entry<'_>| {
+        entry.point.errors.as_ref().map_or(f64::INFINITY, |errors| Weight::of_error(errors.w1).value)
     };
+    let Some(best) = shown.iter().min_by(|a, b| error(a).total_cmp(&error(b))) else { return };
+    let factors: Vec<Shown> =
+        shown.iter().map(|entry| factor(entry.point)).filter(|factor| factor.number().is_finite()).collect();
+    let words = factors_words(&factors);
     let names: Vec<String> =
         shown.iter().map(|entry| format!("{} (W1 {})", entry.point.rung, three_digits(error(entry)))).collect();
     let title = format!("{method}, {word}: {}", names.join(", "));
@@ -81,6 +77,18 @@ fn cell(html: &mut Html, section: &Section<'_>, method: &str) {
         if class == "front" { "on" } else { "off" },
     ));
     html.words(&words).tag("</a></td>");
+}
+
+/// Factors of time from the least to the greatest.
+fn factors_words(factors: &[Shown]) -> String {
+    let numbers = || factors.iter().map(Shown::number);
+    let [least, most] = [numbers().fold(f64::INFINITY, f64::min), numbers().fold(0.0, f64::max)].map(factor_words);
+    let at_most = if factors.iter().all(|factor| factor.is_at_most) { "at most " } else { "" };
+    match factors {
+        [] => "–".to_owned(),
+        _ if least == most || !at_most.is_empty() => format!("{at_most}×{most}"),
+        _ => format!("×{least} to {most}"),
+    }
 }
 
 /// A factor of time with two decimals while that says something.

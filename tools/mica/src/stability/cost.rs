@@ -2,7 +2,7 @@
 //! microfacets, chances and areas) against the same frames with naive ones, in turns in one run.
 
 use super::StabilityArgs;
-use crate::args::SceneArgs;
+use crate::args::{DeviceArgs, SceneArgs};
 use crate::error::{Failure, INTERRUPTED};
 use crate::interrupt::Interrupt;
 use crate::picture::Picture;
@@ -73,7 +73,8 @@ pub fn measure(
     progress: &mut Progress,
     rows: &mut Vec<CostRow>,
 ) -> Result<(), Failure> {
-    let scene = SceneArgs { size: SIZE, device: args.device.clone(), ..SceneArgs::of(SCENE) };
+    let device = DeviceArgs { device: args.device.clone(), ..DeviceArgs::default() };
+    let scene = SceneArgs { size: SIZE, device, ..SceneArgs::of(SCENE) };
     let mut session = Session::new(&scene, progress)?;
     let clock = Clock::of(session.device())?;
     for method in METHODS.iter().filter(|method| args.full || !SLOW.contains(&method.name)) {
@@ -159,7 +160,7 @@ pub fn for_people(rows: &[CostRow]) -> String {
     let [width, height] = SIZE;
     let clock = rows.first().map_or("", |row| row.clock);
     let heading = format!(
-        "\nwhole frames of {SCENE} at {width}x{height} with stable forms of microfacets, chances and areas over naive ones, {ROUNDS} rounds in turns, {clock} time\n\n"
+        "whole frames of {SCENE} at {width}x{height} with stable forms of microfacets, chances and areas over naive ones, {ROUNDS} rounds in turns, {clock} time\n\n"
     );
     heading + &table(&columns, &cells)
 }

@@ -4,8 +4,9 @@ use super::cost::CostRow;
 use crate::report::DeviceReport;
 use crate::table::{Column, table};
 use mica_gpu::DeviceInfo;
-use mica_stability::{Case, Check, Effort, STABILITY_SCHEMA, StabilityError};
-use serde::Serialize;
+use mica_stability::{Case, Check, Effort, STABILITY_SCHEMA, StabilityError, StableForm, UnaryLine};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 /// The result of a run.
 #[derive(Serialize)]
@@ -20,24 +21,72 @@ pub struct StabilityReport {
     /// Cases that were asked for.
     asked: usize,
     pub cases: Vec<CaseReport>,
+    /// Functions of one number, tried on as many words as `effort` says.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub helpers: Vec<UnaryLine>,
     /// What stable forms cost in whole frames; empty where nobody asked.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cost: Vec<CostRow>,
 }
 
 impl StabilityReport {
-    pub fn new(device: &DeviceInfo, effort: Effort, cases: Vec<CaseReport>, asked: usize) -> Self {
+    /// Nothing was measured yet.
+    pub fn new(device: &DeviceInfo, effort: Effort, asked: usize) -> Self {
         Self {
             schema: STABILITY_SCHEMA,
             build: crate::build::BUILD,
             device: DeviceReport::new(device),
             effort: if effort == Effort::Quick { "quick" } else { "full" },
-            held: cases.iter().filter(|case| case.holds).count(),
+            held: 0,
             asked,
-            cases,
+            cases: Vec::new(),
+            helpers: Vec::new(),
             cost: Vec::new(),
         }
     }
+
+    /// Adds a case.
+    pub fn push(&mut self, case: CaseReport) {
+        self.held += usize::from(case.holds);
+        self.cases.push(case);
+    }
+
+    /// Takes over what an earlier run found, if that was of the same build, device and effort: cases that were measured, and
+    /// helpers that were tried to their end.
+    pub fn resume(&mut self, text: &str, cases: &[&Case], helpers: &[&str]) -> Result<(), String> {
+        let earlier: Earlier =
+            serde_json::from_str(text).map_err(|error| format!("no report of this command: {error}"))?;
+        let own = serde_json::to_value(&*self).map_err(|error| error.to_string())?;
+        let also = [("build", &earlier.build), ("effort", &earlier.effort), ("device", &earlier.device)];
+        if let Some((what, theirs)) = also.into_iter().find(|(what, theirs)| own[what] != **theirs) {
+            return Err(format!("is of another {what}, {theirs} and not {}; run without --resume", own[what]));
+        }
+        for found in earlier.cases.into_iter().filter(|found| found.error.is_none()) {
+            if let Some(case) = cases.iter().find(|case| case.id == found.id) {
+                self.push(CaseReport::new(case, Ok(found.checks)));
+            }
+        }
+        self.helpers.extend(earlier.helpers.into_iter().filter(|line| helpers.contains(&&*line.helper)));
+        Ok(())
+    }
+}
+
+/// What is read of an earlier report.
+#[derive(Deserialize)]
+struct Earlier {
+    build: Value,
+    device: Value,
+    effort: Value,
+    cases: Vec<EarlierCase>,
+    #[serde(default)]
+    helpers: Vec<UnaryLine>,
+}
+
+#[derive(Deserialize)]
+struct EarlierCase {
+    id: String,
+    checks: Vec<Check>,
+    error: Option<String>,
 }
 
 /// A case.
@@ -51,6 +100,8 @@ pub struct CaseReport {
     pub naive_fails: bool,
     /// Inputs tried in all checks.
     pub inputs: u64,
+    /// The functions that the stable forms are, and who renders with each.
+    pub stable_forms: Vec<StableForm>,
     pub checks: Vec<Check>,
     /// Why it could not be measured.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -69,8 +120,32 @@ impl CaseReport {
             holds: !checks.is_empty() && checks.iter().all(Check::holds),
             naive_fails: !checks.is_empty() && checks.iter().all(Check::has_teeth),
             inputs: checks.iter().map(|check| check.inputs).sum(),
+            stable_forms: case.stable.iter().filter_map(|name| StableForm::named(name)).copied().collect(),
             checks,
             error,
+        }
+    }
+
+    /// Who renders with the stable forms, the first few of them.
+    fn in_use_by(&self) -> String {
+        const NAMED: usize = 2;
+        let mut users: Vec<&str> = Vec::new();
+        for user in self.stable_forms.iter().flat_map(|form| form.used_by.split(", ")).filter(|user| !user.is_empty()) {
+            if !users.contains(&user) {
+                users.push(user);
+            }
+        }
+        let unused: Vec<&str> =
+            self.stable_forms.iter().filter(|form| form.used_by.is_empty()).map(|form| form.name).collect();
+        let more = users.len().saturating_sub(NAMED);
+        let mut words = users.into_iter().take(NAMED).collect::<Vec<_>>().join(", ");
+        if more > 0 {
+            words += &format!(" and {more} more");
+        }
+        match (words.is_empty(), unused.is_empty()) {
+            (true, _) => "library only".to_owned(),
+            (false, true) => words,
+            (false, false) => format!("{words}; library only: {}", unused.join(", ")),
         }
     }
 
@@ -101,6 +176,7 @@ pub fn for_people(report: &StabilityReport) -> String {
         Column::Right("stable"),
         Column::Right("tolerance"),
         Column::Left("verdict"),
+        Column::Left("in use by"),
     ];
     let rows: Vec<Vec<String>> = cases
         .iter()
@@ -114,6 +190,7 @@ pub fn for_people(report: &StabilityReport) -> String {
                 of(|check| check.stable.worst),
                 of(|check| check.tolerance),
                 case.verdict().to_owned(),
+                case.in_use_by(),
             ]
         })
         .collect();
@@ -124,6 +201,41 @@ pub fn for_people(report: &StabilityReport) -> String {
     }
     text += &format!("\n{held} of {asked} within tolerance\n");
     text
+}
+
+/// A row for each function of one number.
+pub fn helpers_for_people(report: &StabilityReport) -> String {
+    let StabilityReport { device, helpers, effort, .. } = report;
+    let columns = [
+        Column::Left("function"),
+        Column::Left("of"),
+        Column::Right("inputs"),
+        Column::Right("worst error"),
+        Column::Right("at"),
+        Column::Right("bound"),
+        Column::Left("verdict"),
+        Column::Left("an error is"),
+    ];
+    let rows: Vec<Vec<String>> = helpers
+        .iter()
+        .map(|line| {
+            vec![
+                line.helper.clone(),
+                line.domain.clone(),
+                thousands(line.inputs),
+                error(line.worst),
+                format!("{:e}", line.at as f32),
+                error(line.bound),
+                if line.holds() { "holds" } else { "BEYOND" }.to_owned(),
+                line.error_of.clone(),
+            ]
+        })
+        .collect();
+    let all = if *effort == "full" { "all of their words" } else { "words at equal distances" };
+    let mut text = format!("functions of one number on {} ({}), tried on {all}\n\n", device.name, device.driver);
+    text += &table(&columns, &rows);
+    let held = helpers.iter().filter(|line| line.holds()).count();
+    text + &format!("\n{held} of {} within their bounds\n", helpers.len())
 }
 
 fn error(value: f64) -> String {

@@ -1,5 +1,6 @@
 //! A place of a study, opened on a device: what is seen without glints, and the materials as the scene has them.
 
+use super::timing::Clock;
 use crate::args::SceneArgs;
 use crate::error::Failure;
 use crate::progress::Progress;
@@ -72,6 +73,9 @@ pub struct OpenPlace {
 
 impl OpenPlace {
     /// Loads the scene and renders it once without glints, so that what that frame needs is known and there.
+    ///
+    /// # Errors
+    /// With the code of a missing device if there is none, or none that measures time.
     pub fn open(args: &SceneArgs, lighting: Lighting, progress: &mut Progress) -> Result<Self, Failure> {
         Self::open_on(None, args, lighting, progress)
     }
@@ -88,6 +92,7 @@ impl OpenPlace {
         let loaded = Loaded::new(&args, progress)?;
         let content = loaded.fingerprint();
         let session = Session::of(loaded, &args, earlier)?;
+        Clock::of(session.device())?;
         if lighting == Lighting::Lights && session.renderer.scene().lights.is_empty() {
             let scene = &session.scene;
             return Err(Failure::bad_input(format!("{scene} has no lights; leave out --lighting lights for it")));

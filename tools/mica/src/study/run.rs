@@ -10,12 +10,14 @@ use super::reference::Reference;
 use super::sittings::sit_again;
 use super::store::{picture_names, reference_names};
 use super::tables;
-use crate::args::{AccuracyArgs, SceneArgs};
-use crate::error::{Failure, INTERRUPTED};
+use crate::accuracy::AccuracyArgs;
+use crate::args::SceneArgs;
+use crate::error::{Failure, INTERRUPTED, NO_DEVICE};
 use crate::interrupt::Interrupt;
 use crate::output;
 use crate::progress::Progress;
 use crate::scene_choice;
+use crate::spare::Spare;
 use mica_accuracy::Point;
 use mica_gpu::Executor;
 use mica_render::{MethodInfo, Rung};
@@ -44,6 +46,7 @@ pub fn study(
         folder,
         executor: None,
         left_out: LeftOut::default(),
+        spare: Spare::default(),
         measured: 0,
     };
     let finished = stops.iter().try_for_each(|stop| run.stop(stop));
@@ -84,6 +87,7 @@ struct Run<'a> {
     /// That of the last place, if all went well there.
     executor: Option<Executor>,
     left_out: LeftOut,
+    spare: Spare,
     measured: usize,
 }
 
@@ -91,7 +95,7 @@ impl Run<'_> {
     /// A place with all its points. One that cannot be measured is reported, and the others go on.
     ///
     /// # Errors
-    /// An interrupt, and whatever keeps results from being kept.
+    /// An interrupt, a device that is missing, and whatever keeps results from being kept.
     fn stop(&mut self, stop: &Stop) -> Result<(), Failure> {
         let mut next = 0;
         let mut shown = Vec::new();
@@ -103,7 +107,13 @@ impl Run<'_> {
                     self.show(&shown)?;
                     return Err(failure);
                 }
+                Err(Stopped::At(_, failure)) if self.spare.serves(&failure) => next -= 1,
                 Err(Stopped::At(what, failure)) => self.report(&what, &failure),
+                Err(Stopped::Place(failure)) if self.spare.serves(&failure) => {
+                    // What is shown is what is kept: from the start again.
+                    next = 0;
+                    shown.clear();
+                }
                 Err(Stopped::Place(failure)) => {
                     self.report(&stop.scene.display().to_string(), &failure);
                     break;
@@ -120,14 +130,16 @@ impl Run<'_> {
             size: stop.size,
             occlusion: self.args.occlusion,
             device: self.args.device.clone(),
-            memory: self.args.memory,
-            validation: self.args.validation,
-            cache: self.args.cache.clone(),
-            no_cache: self.args.no_cache,
             ..SceneArgs::of("")
         };
         let earlier = self.executor.take();
-        let mut open = OpenPlace::open_on(earlier, &scene, stop.lighting, self.progress).map_err(Stopped::Place)?;
+        let mut open = OpenPlace::open_on(earlier, &scene, stop.lighting, self.progress).map_err(|failure| {
+            match failure.code {
+                // No other place has another.
+                NO_DEVICE => Stopped::For(failure),
+                _ => Stopped::Place(failure),
+            }
+        })?;
         let mut reference = None;
         // Whoever looks at the study finds what its points were compared with, even where none of them is missing.
         if let Some(lost) = self.folder.lost_reference(&open, self.effort) {

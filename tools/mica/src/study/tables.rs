@@ -1,7 +1,7 @@
 //! What was found at a place, for people.
 
 use crate::table::{Column, bytes, table};
-use mica_accuracy::{Estimate, Point};
+use mica_accuracy::{Estimate, Point, Weight};
 
 /// A heading and a row for each point.
 pub fn of_place(points: &[Point]) -> String {
@@ -32,7 +32,7 @@ pub fn of_place(points: &[Point]) -> String {
                 row.push(figure(errors.map(|errors| errors.flip)));
             }
             let cost = &point.cost;
-            row.push(with_spread(cost.glints, 1e-6, 2));
+            row.push(time(cost.glints));
             row.push(with_spread(cost.ratio, 1.0, 3));
             row.push(with_spread(cost.frame, 1e-6, 1));
             row.push(format!("{:.1}", (cost.tables + cost.precomputation) * 1e-6));
@@ -42,6 +42,12 @@ pub fn of_place(points: &[Point]) -> String {
         .collect();
     text += &table(&columns, &rows);
     text
+}
+
+/// Milliseconds of what takes nanoseconds.
+fn time(ns: Estimate) -> String {
+    let Weight { value, is_at_most } = Weight::of_time(ns);
+    if is_at_most { format!("at most {:.2}", value * 1e-6) } else { with_spread(ns, 1e-6, 2) }
 }
 
 /// A figure with its spread: as one width where both sides are about as wide, else as both; a dash for what is not defined.
@@ -71,6 +77,8 @@ mod tests {
         let of = |low, high| with_spread(Estimate { value: 2e6, low, high }, 1e-6, 2);
         assert_eq!([of(1.5e6, 2.5e6), of(1.5e6, 2.4e6)], ["2.00 ± 0.50"; 2]);
         assert_eq!([of(1.5e6, 2.1e6), of(2e6, 2.3e6)], ["2.00 +0.10/-0.50", "2.00 +0.30/-0.00"]);
+        let times = [[1.2e6, 2.8e6], [0.5e6, 3.5e6]].map(|[low, high]| time(Estimate { value: 2e6, low, high }));
+        assert_eq!(times, ["2.00 ± 0.80", "at most 3.50"]);
         assert_eq!(with_spread(Estimate::UNKNOWN, 1.0, 2), "-");
         assert_eq!(with_spread(Estimate { value: 1.0, ..Estimate::UNKNOWN }, 1.0, 1), "1.0");
     }

@@ -3,6 +3,7 @@
 mod accuracy;
 mod bench;
 mod budget;
+mod edits;
 mod information;
 mod mistakes;
 mod occlusion;

@@ -51,6 +51,23 @@ fn sizes_and_counts_out_of_range() {
 }
 
 #[test]
+fn edits_that_cannot_be_made() {
+    let base = [&["--frames", "0", "--method", "smooth"], &SMALL[..]].concat();
+    let wrong_edit = |edit: &str, words: &[&str]| wrong(&[&base[..], &["--edit", edit]].concat(), words);
+    wrong_edit("count", &["KEY=VALUE", "light="]);
+    wrong_edit("lihgt=none", &["lihgt"]);
+    wrong_edit("light=sun", &["light=sun", "dir:X,Y,Z"]);
+    wrong_edit("size=0x0", &["size=0x0", "1 to 16384"]);
+    wrong_edit("camera=1,2,3", &["camera=1,2,3", "EYE:TARGET:FOV_DEG"]);
+    wrong_edit("env-rotate=NaN", &["env-rotate=NaN", "finite"]);
+    wrong_edit("env=somewhere", &["somewhere", "studio"]);
+    wrong_edit("env=missing.exr", &["missing.exr"]);
+    wrong_edit("move=0:1,2", &["move=0:1,2", "INSTANCE:X,Y,Z"]);
+    wrong_edit("move=99:1,2,3", &["move=99:1,2,3", "counted from 0"]);
+    wrong_edit("hat:count=1", &["hat", "flakes"]);
+}
+
+#[test]
 fn settings_that_no_method_has_or_takes() {
     wrong(&["--method", "magic"], &["magic", "wang2020"]);
     wrong(&["--set", "alpha=7"], &["alpha=7", "0.001 to 1"]);

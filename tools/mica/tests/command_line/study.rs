@@ -285,3 +285,20 @@ fn what_cannot_be_studied_is_refused_in_one_line() {
     }
     assert_eq!(std::fs::read_to_string(&file).expect("it is there"), "x");
 }
+
+#[test]
+fn a_missing_device_ends_a_study_and_a_bench_at_once_and_nothing_that_was_kept_is_lost() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let kept = folder.path().join("study");
+    let path = kept.to_str().expect("a plain name");
+    let small = ["sphere", "--quick", "--size", "32x18", "--seconds", "0", "--rounds", "1", "--method", "smooth"];
+    succeeded(run(&[&["accuracy", "-o", path], &small[..]].concat()));
+    let files = || ["points.jsonl", "references.jsonl"].map(|name| std::fs::read(kept.join(name)).expect("lines"));
+    let before = files();
+    let places = ["sphere", "plane", "--size", "32x18", "--size", "40x30", "--device", "nobody"];
+    for command in [&["accuracy", "-o", path, "--quick"][..], &["bench"]] {
+        let line = failed_in_one_line(&run(&[command, &places].concat()), 3);
+        assert!(line.contains("nobody") && !line.contains("left out"), "{line}");
+    }
+    assert_eq!(files(), before);
+}

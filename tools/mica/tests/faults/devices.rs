@@ -1,8 +1,11 @@
 //! Loaders, drivers and devices that are missing, poor or failing. A layer below the program plays them.
 
+use super::programs::{failed, failed_after_warnings, mica};
+use serde_json::Value as Json;
 use std::ffi::OsString;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
+use std::time::{Duration, Instant};
 
 /// A folder for what a test writes, the layer's description among it.
 struct Place(tempfile::TempDir);
@@ -22,7 +25,6 @@ const DEVICE_LOST: i32 = -4;
 const EXTENSION_NOT_PRESENT: i32 = -7;
 const INCOMPATIBLE_DRIVER: i32 = -9;
 const INVALID_SHADER: i32 = -1_000_012_000;
-const TIMEOUT: i32 = 2;
 
 impl Place {
     fn new() -> Self {
@@ -34,10 +36,8 @@ impl Place {
     }
 
     fn mica(&self, environment: &[(&str, OsString)], arguments: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_mica"))
+        mica()
             .args(arguments)
-            .env("XDG_CACHE_HOME", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache"))
-            .env_remove("RUST_LOG")
             .envs(environment.iter().map(|(name, value)| (name, value)))
             .output()
             .expect("mica starts")
@@ -59,19 +59,8 @@ impl Place {
     fn fails(&self, faults: &str, arguments: &[&str], code: i32, words: &[&str]) {
         let _ = std::fs::remove_file(self.argument("a.exr"));
         let output = self.render(faults, arguments);
-        assert_ends(&output, code, words);
+        failed(&output, code, words);
         assert!(!Path::new(&self.argument("a.exr")).exists(), "{faults}: a picture is left");
-    }
-}
-
-/// The exit code, and one line on stderr with all the words.
-#[track_caller]
-fn assert_ends(output: &Output, code: i32, words: &[&str]) {
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{error}");
-    assert!(error.starts_with("mica: ") && error.lines().count() == 1, "{error}");
-    for word in words {
-        assert!(error.contains(word), "{word} is not in: {error}");
     }
 }
 
@@ -91,7 +80,7 @@ fn f19_without_a_loader_the_package_to_install_is_named() {
     std::fs::write(place.argument("libvulkan.so.1"), "not a library").expect("a file");
     let nowhere = [("LD_LIBRARY_PATH", place.0.path().into())];
     let output = place.mica(&nowhere, &render(&[]));
-    assert_ends(&output, 3, &["no Vulkan loader", "libvulkan1"]);
+    failed(&output, 3, &["no Vulkan loader", "libvulkan1"]);
 }
 
 #[test]
@@ -99,7 +88,7 @@ fn f20_without_a_driver_the_package_is_named_and_the_oracle_still_answers() {
     let place = Place::new();
     let nowhere = environment(&[("VK_DRIVER_FILES", "/nonexistent"), ("VK_ICD_FILENAMES", "/nonexistent")]);
     let output = place.mica(&nowhere, &render(&[]));
-    assert_ends(&output, 3, &["no Vulkan driver", "mesa-vulkan-drivers", "VK_DRIVER_FILES"]);
+    failed(&output, 3, &["no Vulkan driver", "mesa-vulkan-drivers", "VK_DRIVER_FILES"]);
     assert_works(&place.mica(&nowhere, &["oracle", "--seeds", "2"]));
     for result in [INCOMPATIBLE_DRIVER, INITIALIZATION_FAILED] {
         place.fails(&format!("vkCreateInstance@0={result}"), &[], 3, &["no Vulkan driver"]);
@@ -163,64 +152,130 @@ fn f23_a_buffer_that_shaders_cannot_see_whole_is_refused_by_name() {
 #[test]
 fn f24_memory_that_runs_out_at_any_allocation_ends_in_one_line() {
     let place = Place::new();
+    let picture = |faults: &str| {
+        assert_works(&place.render(faults, &[]));
+        std::fs::read(place.argument("a.exr")).expect("a picture")
+    };
+    let expected = picture("");
     for allocation in 0.. {
-        let faults = format!("vkAllocateMemory@{allocation}={OUT_OF_DEVICE_MEMORY}");
+        // One that fails is made once more, smaller, and then there is none.
+        assert!(picture(&format!("vkAllocateMemory@{allocation}={OUT_OF_DEVICE_MEMORY}")) == expected);
+        let faults = format!("vkAllocateMemory@{allocation}+={OUT_OF_DEVICE_MEMORY}");
         if place.render(&faults, &[]).status.success() {
             assert!(allocation > 0, "nothing was allocated");
             break;
         }
         place.fails(&faults, &[], 4, &["out of memory"]);
     }
+    assert!(
+        picture(&format!("largestAllocation={}", 12 << 20)) == expected,
+        "blocks are larger, and nothing needs them"
+    );
+    place.fails("largestAllocation=4096", &[], 4, &["out of memory"]);
     place.fails(&format!("vkAllocateMemory@0+={OUT_OF_DEVICE_MEMORY}"), &[], 4, &["out of memory"]);
     place.fails(&format!("vkCreateInstance@0={OUT_OF_DEVICE_MEMORY}"), &[], 4, &["out of memory"]);
     place.fails(&format!("vkCreateDevice@0={OUT_OF_DEVICE_MEMORY}"), &[], 4, &["out of memory"]);
 }
 
+/// What is said of the one loss that is made up for.
+const ONCE_MORE: &str = "warning: the device was lost";
+
 #[test]
-fn f25_a_device_lost_at_any_submission_or_wait_ends_in_one_line() {
+fn f25_a_device_lost_for_good_ends_in_one_line_after_one_more_try() {
     let place = Place::new();
-    for call in ["vkQueueSubmit2@0", "vkWaitForFences@0", "vkGetQueryPoolResults@0", "vkCreateDevice@0"] {
-        let frames = ["--frames", "2"];
-        place.fails(&format!("{call}+={DEVICE_LOST}"), &frames, 4, &["the device was lost"]);
-    }
-    let later = ["--frames", "2", "--samples", "2"];
-    for call in ["vkQueueSubmit2@2", "vkWaitForFences@2"] {
-        place.fails(&format!("{call}={DEVICE_LOST}"), &later, 4, &["the device was lost"]);
+    for call in
+        ["vkQueueSubmit2@0", "vkWaitForFences@0", "vkGetQueryPoolResults@0", "vkCreateDevice@0", "vkQueueSubmit2@2"]
+    {
+        let _ = std::fs::remove_file(place.argument("a.exr"));
+        let output = place.render(&format!("{call}+={DEVICE_LOST}"), &["--frames", "2"]);
+        let (warnings, _) = failed_after_warnings(&output, 4, &["the device was lost"]);
+        assert!(warnings.starts_with(ONCE_MORE) && warnings.lines().count() == 1, "{call}: {warnings}");
+        assert!(!Path::new(&place.argument("a.exr")).exists(), "{call}: a picture is left");
     }
 }
 
-/// The lines of points that were measured before the device went are whole and there.
 #[test]
-fn f25_a_bench_that_loses_the_device_keeps_what_was_measured() {
+fn f25_a_device_that_is_lost_once_is_replaced_and_the_picture_is_the_same() {
     let place = Place::new();
-    let bench = ["bench", "--occlusion", "--size", "24x18", "--rays", "100", "--rounds", "2", "--json", "-", "plane"];
-    let lines = |output: &Output| {
-        let text = String::from_utf8_lossy(&output.stdout).into_owned();
-        text.lines().map(|line| serde_json::from_str(line).expect("a whole line")).collect::<Vec<serde_json::Value>>()
+    let arguments = ["--frames", "2", "--samples", "2"];
+    let picture = |faults: &str| {
+        let said = assert_works(&place.render(faults, &arguments));
+        (std::fs::read(place.argument("a.exr")).expect("a picture"), said)
     };
-    let whole = place.under("", &[&bench[..], &["sphere"]].concat());
+    let (expected, silence) = picture("");
+    assert_eq!(silence, "");
+    for call in ["vkQueueSubmit2@0", "vkQueueSubmit2@2", "vkWaitForFences@1", "vkWaitForFences@3", "vkCreateDevice@0"] {
+        let (bytes, said) = picture(&format!("{call}={DEVICE_LOST}"));
+        assert!(said.starts_with(ONCE_MORE) && said.lines().count() == 1, "{call}: {said}");
+        assert!(bytes == expected, "{call}: another picture");
+    }
+}
+
+/// The lines of a bench's standard output.
+fn lines(output: &Output) -> Vec<Json> {
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    text.lines().map(|line| serde_json::from_str(line).expect("a whole line")).collect()
+}
+
+const RAYS: [&str; 10] = ["bench", "--occlusion", "--size", "24x18", "--rays", "100", "--rounds", "2", "--json", "-"];
+
+#[test]
+fn f25_a_bench_that_loses_the_device_goes_on_once_and_keeps_what_was_measured() {
+    let place = Place::new();
+    let bench = [&RAYS[..], &["plane", "sphere"]].concat();
+    let whole = place.under("", &bench);
     assert_works(&whole);
     let all = lines(&whole).len();
-    // The later the loss, the more is kept, and less than all of it.
+    // The later the losses begin, the more is kept, and less than all of it.
     let mut kept = Vec::new();
     for submission in [0, 12, 24, 48, 96, 192, 384] {
-        let faults = format!("vkQueueSubmit2@{submission}={DEVICE_LOST}");
-        let output = place.under(&faults, &[&bench[..], &["sphere"]].concat());
-        if output.status.success() {
+        let lost = place.under(&format!("vkQueueSubmit2@{submission}+={DEVICE_LOST}"), &bench);
+        if lost.status.success() {
             break;
         }
-        assert_ends(&output, 4, &["the device was lost"]);
-        kept.push(lines(&output).len());
+        let (warnings, _) = failed_after_warnings(&lost, 4, &["the device was lost"]);
+        assert!(warnings.starts_with(ONCE_MORE), "{warnings}");
+        kept.push(lines(&lost).len());
+        let once = place.under(&format!("vkQueueSubmit2@{submission}={DEVICE_LOST}"), &bench);
+        assert!(assert_works(&once).starts_with(ONCE_MORE));
+        assert_eq!(lines(&once).len(), all, "a loss at submission {submission} took lines");
     }
     assert!(kept.is_sorted() && kept[0] == 0 && kept.iter().any(|kept| (1..all).contains(kept)), "{kept:?} of {all}");
 }
 
 #[test]
-fn f26_a_device_that_hangs_is_given_up() {
+fn f25_a_bench_of_methods_measures_the_point_of_a_lost_device_again() {
     let place = Place::new();
-    for wait in 0..2 {
-        let faults = format!("vkWaitForFences@{wait}={TIMEOUT}");
-        place.fails(&faults, &["--frames", "2"], 4, &["did not finish within"]);
+    let bench =
+        ["bench", "sphere", "--size", "8x6", "--method", "smooth", "--method", "zirr_kaplanyan", "--rounds", "1"];
+    let bench = [&bench[..], &["--json", "-", "--quiet"]].concat();
+    let names = |output: &Output| lines(output).iter().map(|line| line["method"].to_string()).collect::<Vec<_>>();
+    let whole = place.under("", &bench);
+    assert_works(&whole);
+    let expected = names(&whole);
+    assert!(expected.len() >= 2, "{expected:?}");
+    // In the first point, in a later one, and in the sittings after all points: as far as there are so many submissions.
+    let mut losses = 0;
+    for submission in [3, 20, 40, 60, 80] {
+        let output = place.under(&format!("vkQueueSubmit2@{submission}={DEVICE_LOST}"), &bench);
+        losses += usize::from(assert_works(&output).starts_with(ONCE_MORE));
+        assert_eq!(names(&output), expected, "a loss at submission {submission}");
+    }
+    assert!(losses >= 3, "only {losses} losses");
+    // Twice: the second point that loses its device is left out, by name.
+    let output = place.under(&format!("vkQueueSubmit2@3={DEVICE_LOST};vkQueueSubmit2@5={DEVICE_LOST}"), &bench);
+    let (warnings, _) = failed_after_warnings(&output, 4, &["left out"]);
+    assert!(warnings.lines().count() == 2 && warnings.contains("is left out: the device was lost"), "{warnings}");
+}
+
+/// An hour's wait in a second, as on processors frames may take that long.
+#[test]
+fn f26_a_device_that_hangs_is_given_up_once_and_not_waited_for_again() {
+    let place = Place::new();
+    for submission in 0..2 {
+        let start = Instant::now();
+        place.fails(&format!("hang={submission}/3600"), &["--frames", "2"], 4, &["did not finish within"]);
+        assert!(start.elapsed() >= Duration::from_secs(1), "it was not waited for");
     }
 }
 
@@ -267,6 +322,65 @@ fn f40_a_device_without_timestamps_renders_and_says_that_it_measures_nothing() {
     assert!(!passes.is_empty() && passes.iter().all(|pass| pass["median_ns"].is_null()), "{report}");
 }
 
+/// Every number of a report that is a time.
+fn times(report: &Json) -> Vec<f64> {
+    fn collect(value: &Json, is_time: bool, found: &mut Vec<f64>) {
+        match value {
+            Json::Object(fields) => {
+                fields.iter().for_each(|(key, value)| {
+                    collect(value, is_time || key == "ns" || key.ends_with("_ns"), found);
+                });
+            }
+            Json::Array(all) => all.iter().for_each(|value| collect(value, is_time, found)),
+            Json::Number(number) if is_time => found.extend(number.as_f64()),
+            _ => {}
+        }
+    }
+    let mut found = Vec::new();
+    collect(report, false, &mut found);
+    found
+}
+
+#[test]
+fn f40_a_clock_that_jumps_or_runs_backwards_gives_no_time_and_one_that_wraps_the_right_one() {
+    let place = Place::new();
+    let json = place.argument("a.json");
+    let begun = Instant::now();
+    let report = |faults: &str| {
+        assert_works(&place.render(faults, &["--frames", "3", "--no-cache", "--json", &json]));
+        let text = std::fs::read_to_string(&json).expect("a report");
+        let report: Json = serde_json::from_str(&text).expect("JSON");
+        let most_ns = begun.elapsed().as_nanos() as f64;
+        assert!(times(&report).iter().all(|ns| (0.0..most_ns).contains(ns)), "{faults}: {report}");
+        let passes = report["passes"].as_array().expect("passes");
+        let known = passes.iter().filter(|pass| pass["median_ns"].is_u64()).count();
+        (known, passes.len(), report)
+    };
+    let (known, all, right) = report("");
+    assert!(known == all && right["frame_ns"]["overlapped_median"].is_u64(), "{right}");
+    let (known, ..) = report("clock=wrap;timestampValidBits=36");
+    assert_eq!(known, all, "a counter that wraps is understood");
+    let (known, _, back) = report("clock=back");
+    assert_eq!(known, 0, "{back}");
+    assert!(back["frame_ns"]["overlapped_median"].is_null() && back["frame_ns"]["isolated_sum"].is_null(), "{back}");
+    assert!(back["frame_ns"]["overlapped_cpu_median"].is_u64(), "the system's own clock is another: {back}");
+    let (known, _, jump) = report("clock=jump");
+    assert!((1..all).contains(&known), "only the pass in which it jumps has no time: {jump}");
+    assert!(jump["frame_ns"]["overlapped_median"].is_null() && jump["frame_ns"]["isolated_sum"].is_null(), "{jump}");
+
+    // For people, too: a dash stands for what is not known.
+    let output = place.under("clock=back", &["render", "sphere", "--size", "8x6", "--frames", "2", "--no-cache"]);
+    assert_works(&output);
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("frame: - ms as it runs") && text.contains("- ms pass by pass"), "{text}");
+    let bench = [&RAYS[..], &["plane"]].concat();
+    for clock in ["clock=back", "clock=jump"] {
+        let output = place.under(clock, &bench);
+        let text = assert_works(&output);
+        assert!(lines(&output).iter().flat_map(times).all(|ns| (0.0..60e9).contains(&ns)), "{clock}: {text}");
+    }
+}
+
 #[test]
 fn f44_of_two_devices_the_one_named_is_taken_and_a_wrong_name_lists_both() {
     let place = Place::new();
@@ -282,10 +396,11 @@ fn f44_of_two_devices_the_one_named_is_taken_and_a_wrong_name_lists_both() {
     let on = |device: &str| place.mica(&both, &render(&["--device", device]));
     assert_works(&on("0"));
     assert_works(&on("1"));
-    assert_ends(&on("no such device"), 3, &["no such device", "0 ", "1 "]);
-    assert_ends(&on("2"), 3, &["'2'", "0 ", "1 "]);
+    failed(&on("no such device"), 3, &["no such device", "0 ", "1 "]);
+    failed(&on("2"), 3, &["'2'", "0 ", "1 "]);
     // Unplugged between being found and being opened.
-    place.fails(&format!("vkCreateDevice@0+={DEVICE_LOST}"), &[], 4, &["the device was lost"]);
+    let lost = place.render(&format!("vkCreateDevice@0+={DEVICE_LOST}"), &[]);
+    failed_after_warnings(&lost, 4, &["the device was lost"]);
     place.fails(&format!("vkCreateDevice@0+={INITIALIZATION_FAILED}"), &[], 3, &["cannot be used"]);
 }
 
@@ -294,5 +409,5 @@ fn f45_validation_that_is_asked_for_and_not_there_is_an_error() {
     let place = Place::new();
     let nowhere = environment(&[("VK_LAYER_PATH", "/nonexistent")]);
     let output = place.mica(&nowhere, &render(&["--validation"]));
-    assert_ends(&output, 3, &["no Vulkan validation", "vulkan-validationlayers"]);
+    failed(&output, 3, &["no Vulkan validation", "vulkan-validationlayers"]);
 }

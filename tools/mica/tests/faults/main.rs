@@ -4,8 +4,11 @@
 mod cache_and_values;
 mod devices;
 mod files;
+mod full_disks;
 mod outputs;
 mod pictures;
+mod programs;
+mod signals;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -87,12 +90,7 @@ impl Place {
     #[track_caller]
     fn fails(&self, code: i32, memory_kib: u64, arguments: &[&str], words: &[&str]) {
         let output = self.render(memory_kib, arguments);
-        let error = String::from_utf8(output.stderr).expect("stderr is UTF-8");
-        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {}: {error}", output.status);
-        assert!(error.starts_with("mica: ") && error.ends_with('\n') && error.lines().count() == 1, "{error}");
-        for word in words {
-            assert!(error.contains(word), "{word} is not in: {error}");
-        }
+        programs::failed(&output, code, words);
         assert_eq!(String::from_utf8_lossy(&output.stdout), "");
         assert_eq!(self.written(), 0, "files are left of {arguments:?}");
     }

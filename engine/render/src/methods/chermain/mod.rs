@@ -42,13 +42,12 @@
 
 mod dictionary;
 
-use super::lobe::SmoothEnvironment;
+use super::shared::Shared;
 use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Buffer, Graph, Image, Lifetime};
 use mica_shaders::glints::chermain::{Bind, Params};
-use std::collections::BTreeMap;
 
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: "chermain",
@@ -121,9 +120,8 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 /// The method at work.
 #[derive(Default)]
 pub(crate) struct Chermain {
-    environment: SmoothEnvironment,
-    /// By the bits of their lobes' standard deviation.
-    dictionaries: BTreeMap<u64, Buffer>,
+    /// By their lobes' standard deviation.
+    dictionaries: Shared<f64, Buffer>,
 }
 
 /// Standard deviation of the lobes that a material asks for, in slopes of the dictionary.
@@ -140,24 +138,21 @@ fn lobe(material: &GlintMaterial) -> f64 {
 }
 
 impl Method for Chermain {
-    fn keep(&mut self, materials: &[GlintMaterial]) {
-        self.dictionaries.retain(|bits, _| materials.iter().any(|material| lobe(material).to_bits() == *bits));
-    }
-
-    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables) {
-        self.environment.update(g, material, environment);
-        let lobe = lobe(material);
-        self.dictionaries.entry(lobe.to_bits()).or_insert_with(|| {
-            g.because(format!("material {}: no dictionary had lobes of {lobe:.3}", material.name));
-            let mut buffer = Buffer::new("chermain_dictionary", dictionary::BYTES, Lifetime::Settings);
-            g.upload(&mut buffer, dictionary::with_lobe(lobe));
-            buffer
+    fn update(&mut self, g: &mut Graph, materials: &[GlintMaterial], _environment: &EnvironmentTables) {
+        let of = |material: &GlintMaterial| Some(lobe(material));
+        self.dictionaries.update(materials, of, |mut wanted| {
+            let change = if wanted.before.is_some() { "lobes are now" } else { "first frame with lobes" };
+            wanted.because(g, format_args!("{change} {:.3} wide", wanted.key));
+            let new = || Buffer::new("chermain_dictionary", dictionary::BYTES, Lifetime::Settings);
+            let mut buffer = wanted.spare.take().unwrap_or_else(new);
+            g.upload(&mut buffer, dictionary::with_lobe(wanted.key));
+            Some(buffer)
         });
     }
 
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
-        let Some(environment) = self.environment.lobe() else { return };
-        let Some(dictionary) = self.dictionaries.get(&lobe(material).to_bits()) else { return };
+        let environment = shading.environment.beckmann();
+        let Some(dictionary) = self.dictionaries.of(material) else { return };
         let values = &material.values;
         let params = Params {
             material: material.index as u32,
@@ -177,6 +172,6 @@ impl Method for Chermain {
             albedo: &environment.albedo,
             dictionary: dictionary,
         );
-        g.pass(bind, params, shading.gbuffer.ids.extent());
+        shading.pass(g, bind, params, material);
     }
 }

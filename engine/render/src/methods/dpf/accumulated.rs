@@ -1,50 +1,30 @@
-//! The tables of a material's roughness, widened from 1 degree to its gamma.
+//! The tables of a roughness, widened from 1 degree to a gamma.
 
 use super::{DpfSource, TABLE_GAMMA_DEG};
-use crate::methods::GlintMaterial;
+use crate::methods::shared::Wanted;
 use mica_graph::{Buffer, Extent, Graph, Lifetime};
 use mica_shaders::{constants as c, dpf_accumulate};
 
 /// What an accumulated table depends on: alpha, gamma in degrees, the tables it was made from.
 pub(in crate::methods) type AccumulatedKey = (f64, f64, DpfSource);
 
-/// P(i, o, gamma) of one material.
-pub(in crate::methods) struct Accumulated {
-    pub table: Buffer,
-    made_for: Option<AccumulatedKey>,
-}
-
-impl Accumulated {
-    /// A table that the first update fills.
-    pub fn new(material: &str) -> Self {
-        Self { table: table(&format!("dpf_accumulated {material}")), made_for: None }
-    }
-
-    /// Declares the pass that fills it if anything that it depends on changed, and says what that is now. `dpf` holds
-    /// tables at `alphas`.
-    pub fn update(
-        &mut self,
-        g: &mut Graph,
-        material: &GlintMaterial,
-        alpha: f64,
-        (source, alphas, dpf): (DpfSource, &[f32], &Buffer),
-    ) -> AccumulatedKey {
-        let gamma_deg = material.values.number("gamma_deg");
-        let key = (alpha, gamma_deg, source);
-        if self.made_for == Some(key) {
-            return key;
-        }
-        let change = match self.made_for {
-            Some((before, _, _)) if before != alpha => format!("alpha is now {alpha}"),
-            Some((_, before, _)) if before != gamma_deg => format!("gamma is now {gamma_deg} degrees"),
-            Some(_) => "the directional probability table changed".to_owned(),
-            None => format!("first frame with alpha {alpha}, gamma {gamma_deg} degrees"),
-        };
-        g.because(format!("material {}: {change}", material.name));
-        accumulate(g, (alphas, dpf), alpha, gamma_deg, &mut self.table);
-        self.made_for = Some(key);
-        key
-    }
+/// Declares the pass that makes P(i, o, gamma). `dpf` holds tables at `alphas`.
+pub(in crate::methods) fn accumulated(
+    g: &mut Graph,
+    wanted: Wanted<AccumulatedKey, Buffer>,
+    dpf: (&[f32], &Buffer),
+) -> Buffer {
+    let (alpha, gamma_deg, _) = wanted.key;
+    let change = match wanted.before {
+        Some((before, _, _)) if before != alpha => format!("alpha is now {alpha}"),
+        Some((_, before, _)) if before != gamma_deg => format!("gamma is now {gamma_deg} degrees"),
+        Some(_) => "the directional probability table changed".to_owned(),
+        None => format!("first frame with alpha {alpha}, gamma {gamma_deg} degrees"),
+    };
+    wanted.because(g, change);
+    let mut table = wanted.spare.unwrap_or_else(|| table("dpf_accumulated"));
+    accumulate(g, dpf, alpha, gamma_deg, &mut table);
+    table
 }
 
 /// An accumulated table, not filled yet.

@@ -3,7 +3,7 @@
 
 mod accumulated;
 
-pub(super) use accumulated::{Accumulated, AccumulatedKey};
+pub(super) use accumulated::{AccumulatedKey, accumulated};
 
 use super::GlintMaterial;
 use crate::{Cache, Progress, RenderError, Update};
@@ -67,9 +67,9 @@ fn tables(alphas: &[f32]) -> Buffer {
     Buffer::new("dpf", bytes(alphas), Lifetime::Scene)
 }
 
-/// Declares the passes that make the tables at these roughnesses by quadrature.
-pub(super) fn quadrature(g: &mut Graph, alphas: &[f32]) -> Buffer {
-    let mut tables = tables(alphas);
+/// Declares the passes that make the tables at these roughnesses by quadrature, in spare ones of as many if there are any.
+pub(super) fn quadrature(g: &mut Graph, alphas: &[f32], spare: Option<Buffer>) -> Buffer {
+    let mut tables = spare.unwrap_or_else(|| tables(alphas));
     let sin2_half_gamma = (0.5 * TABLE_GAMMA_DEG.to_radians()).sin().powi(2) as f32;
     for (table, &alpha) in alphas.iter().enumerate() {
         let params = dpf::Params { alpha, sin2_half_gamma, first: table as u32 * c::DPF_ENTRIES };
@@ -81,7 +81,7 @@ pub(super) fn quadrature(g: &mut Graph, alphas: &[f32]) -> Buffer {
 /// Declares the passes that make P(i, o, gamma) at one roughness as `wang2020` looks it up (`shared/accumulated_dpf.glsl`),
 /// from 1-degree tables at `alphas` by quadrature.
 pub fn lit_probability_table(g: &mut Graph, alphas: &[f32], alpha: f64, gamma_deg: f64) -> Buffer {
-    let dpf = quadrature(g, alphas);
+    let dpf = quadrature(g, alphas, None);
     let mut table = accumulated::table("lit_probability_table");
     accumulated::accumulate(g, (alphas, &dpf), alpha, gamma_deg, &mut table);
     table
@@ -115,7 +115,7 @@ pub(super) fn precompute(
         DpfSource::Quadrature => {
             progress("directional probability tables by quadrature", 0, 1);
             let mut g = Graph::new();
-            let made = quadrature(&mut g, alphas);
+            let made = quadrature(&mut g, alphas, None);
             let run = executor.run(g, Timing::Isolated)?;
             progress("directional probability tables by quadrature", 1, 1);
             (made, run.passes.iter().filter_map(|pass| pass.ns).sum(), "by quadrature".to_owned())

@@ -31,13 +31,13 @@
 
 mod triangles;
 
-use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints, leaf_level};
+use super::shared::Shared;
+use super::{Claim, GlintMaterial, Method, MethodInfo, Reads, Rung, Shading, bind_glints, leaf_level};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Buffer, Graph, Image, Lifetime};
 use mica_shaders::constants as c;
 use mica_shaders::glints::jakob::{Bind, Params};
-use std::collections::BTreeMap;
 use std::f64::consts::PI;
 pub use triangles::JakobTable;
 
@@ -110,40 +110,36 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 /// The method at work.
 #[derive(Default)]
 pub(crate) struct Jakob {
-    /// By the material's index.
-    tables: BTreeMap<usize, Table>,
+    /// By alpha.
+    tables: Shared<f64, Table>,
 }
 
-/// The triangles of one material on the GPU.
+/// The triangles of one roughness on the GPU.
 struct Table {
     triangles: Buffer,
     density_integral: f64,
-    alpha: f64,
 }
 
 impl Method for Jakob {
-    fn keep(&mut self, materials: &[GlintMaterial]) {
-        self.tables.retain(|index, _| materials.iter().any(|material| material.index == *index));
+    fn update(&mut self, g: &mut Graph, materials: &[GlintMaterial], _environment: &EnvironmentTables) {
+        let alpha = |material: &GlintMaterial| Some(material.values.number("alpha"));
+        self.tables.update(materials, alpha, |wanted| {
+            let change = if wanted.before.is_some() { "alpha is now" } else { "first frame with alpha" };
+            wanted.because(g, format_args!("{change} {}", wanted.key));
+            let JakobTable { triangles, density_integral } = JakobTable::new(wanted.key);
+            let bytes: &[u8] = bytemuck::cast_slice(&triangles);
+            let mut triangles = Buffer::new("jakob_triangles", bytes.len() as u64, Lifetime::Settings);
+            g.upload(&mut triangles, bytes);
+            Some(Table { triangles, density_integral })
+        });
     }
 
-    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, _environment: &mut EnvironmentTables) {
-        let alpha = material.values.number("alpha");
-        let before = self.tables.get(&material.index).map(|table| table.alpha);
-        if before == Some(alpha) {
-            return;
-        }
-        let change = if before.is_some() { "alpha is now" } else { "first frame with alpha" };
-        g.because(format!("material {}: {change} {alpha}", material.name));
-        let table = JakobTable::new(alpha);
-        let bytes: &[u8] = bytemuck::cast_slice(&table.triangles);
-        let mut triangles =
-            Buffer::new(format!("jakob_triangles {}", material.name), bytes.len() as u64, Lifetime::Settings);
-        g.upload(&mut triangles, bytes);
-        self.tables.insert(material.index, Table { triangles, density_integral: table.density_integral, alpha });
+    fn reads(&self) -> Reads {
+        Reads::Map
     }
 
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
-        let Some(table) = self.tables.get(&material.index) else { return };
+        let Some(table) = self.tables.of(material) else { return };
         let values = &material.values;
         let flakes = material.flakes();
         let sin2 = material.sin2_half_gamma();
@@ -151,7 +147,7 @@ impl Method for Jakob {
         let mean_solid_angle = PI * sin2;
         let params = Params {
             material: material.index as u32,
-            alpha: table.alpha as f32,
+            alpha: values.number("alpha") as f32,
             sin_half_gamma: sin2.sqrt() as f32,
             cos_half_gamma: (1.0 - sin2).sqrt() as f32,
             solid_angle: material.solid_angle() as f32,
@@ -170,8 +166,8 @@ impl Method for Jakob {
         let bind = bind_glints!(
             Bind, shading, glints,
             triangles: &table.triangles,
-            environment: shading.environment,
+            environment: shading.environment.map(),
         );
-        g.pass(bind, params, shading.gbuffer.ids.extent());
+        shading.pass(g, bind, params, material);
     }
 }

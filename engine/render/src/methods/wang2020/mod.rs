@@ -20,7 +20,8 @@
 mod tables;
 
 use super::dpf::{self, DpfSource};
-use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
+use super::shared::Shared;
+use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Reads, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
 use crate::settings::{Kind, Setting, Value};
 use crate::{Cache, Progress, RenderError, Update};
@@ -28,7 +29,6 @@ use mica_gpu::Executor;
 use mica_graph::{Buffer, Graph, Image};
 use mica_shaders::constants::DPF_ROUGHNESSES;
 use mica_shaders::glints::wang2020::{Bind, Params};
-use std::collections::BTreeMap;
 use tables::Tables;
 
 /// The roughnesses at which the paper tabulates.
@@ -129,9 +129,8 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 #[derive(Default)]
 pub(crate) struct Wang2020 {
     /// The directional probability tables, by how they were made.
-    dpf: BTreeMap<DpfSource, Buffer>,
-    /// By the material's index.
-    tables: BTreeMap<usize, Tables>,
+    dpf: Shared<DpfSource, Buffer>,
+    tables: Tables,
 }
 
 /// The roughness that a material is rendered with: the paper's tables begin at .02, and below that P would be that of .02
@@ -149,7 +148,7 @@ impl Method for Wang2020 {
         progress: Progress,
     ) -> Result<Vec<Update>, RenderError> {
         let source = DpfSource::of(material);
-        if self.dpf.contains_key(&source) {
+        if self.dpf.get(source).is_some() {
             return Ok(Vec::new());
         }
         let (buffer, update) = dpf::precompute(source, &ALPHAS, executor, cache, progress)?;
@@ -157,31 +156,32 @@ impl Method for Wang2020 {
         Ok(vec![update])
     }
 
-    fn keep(&mut self, materials: &[GlintMaterial]) {
-        self.tables.retain(|index, _| materials.iter().any(|material| material.index == *index));
-        // The table by quadrature may stand in for one that is still to be counted.
-        let counted = |source| materials.iter().any(|material| DpfSource::of(material) == source);
-        self.dpf.retain(|source, _| *source == DpfSource::Quadrature || counted(*source));
+    fn update(&mut self, g: &mut Graph, materials: &[GlintMaterial], environment: &EnvironmentTables) {
+        let there = self.dpf.keys();
+        // Counting takes too long for a frame: it happens in `precompute`, and a table by quadrature stands in without it.
+        let found = |material: &GlintMaterial| {
+            let source = DpfSource::of(material);
+            if there.contains(&source) { source } else { DpfSource::Quadrature }
+        };
+        self.dpf.update(
+            materials,
+            |material| Some(found(material)),
+            |wanted| {
+                wanted.because(g, "no directional probability table was precomputed");
+                Some(dpf::quadrature(g, &ALPHAS, wanted.spare))
+            },
+        );
+        let accumulated =
+            |material: &GlintMaterial| (alpha(material), material.values.number("gamma_deg"), found(material));
+        self.tables.update(g, materials, accumulated, &self.dpf, environment);
     }
 
-    fn update(&mut self, g: &mut Graph, material: &GlintMaterial, environment: &mut EnvironmentTables) {
-        let mut source = DpfSource::of(material);
-        if !self.dpf.contains_key(&source) {
-            // Counting takes too long for a frame: it happens in `precompute`, and this table stands in without it.
-            source = DpfSource::Quadrature;
-            self.dpf.entry(source).or_insert_with(|| {
-                g.because(format!("material {}: no directional probability table was precomputed", material.name));
-                dpf::quadrature(g, &ALPHAS)
-            });
-        }
-        let Some(dpf) = self.dpf.get(&source) else { return };
-        let tables =
-            self.tables.entry(material.index).or_insert_with(|| Tables::new(&material.name, environment.present()));
-        tables.update(g, material, (source, dpf), environment);
+    fn reads(&self) -> Reads {
+        Reads::Map
     }
 
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
-        let Some(tables) = self.tables.get(&material.index) else { return };
+        let Some(tables) = self.tables.of(material) else { return };
         let values = &material.values;
         let depth = values.number("depth") as u32;
         let params = Params {
@@ -198,12 +198,12 @@ impl Method for Wang2020 {
         };
         let bind = bind_glints!(
             Bind, shading, glints,
-            accumulated: &tables.accumulated.table,
-            prefiltered: &tables.prefiltered,
-            nodes: &tables.nodes,
-            bounds: &tables.bounds,
+            accumulated: tables.accumulated,
+            prefiltered: tables.prefiltered,
+            nodes: &tables.quadtree.nodes,
+            bounds: &tables.quadtree.bounds,
         );
-        g.pass(bind, params, shading.gbuffer.ids.extent());
+        shading.pass(g, bind, params, material);
     }
 
     fn finish(&self, material: &GlintMaterial) -> Finish {

@@ -1,31 +1,147 @@
-//! The tables of one material, and the passes that fill them: accumulated P, prefiltered environment, quadtree.
+//! The tables that materials look up, and the passes that fill them: accumulated P, prefiltered environment, quadtree.
 
-use super::{ALPHAS, alpha};
+use super::ALPHAS;
 use crate::environment_tables::EnvironmentTables;
 use crate::methods::GlintMaterial;
-use crate::methods::dpf::{Accumulated, AccumulatedKey, DpfSource};
+use crate::methods::dpf::{self, AccumulatedKey, DpfSource};
+use crate::methods::shared::{Shared, Wanted};
 use crate::settings::Value;
 use mica_graph::{Buffer, Extent, Graph, Lifetime};
 use mica_shaders::{constants as c, prefilter, prefilter_probability, quadtree};
-use std::f64::consts::PI;
 
 const PREFILTER_ENTRIES: u64 =
     (c::PREFILTER_THETA_N * c::PREFILTER_PHI_N * c::PREFILTER_THETA_O * c::PREFILTER_PHI_O) as u64;
 
-/// What a prefiltered table depends on, beside the accumulated one: samples, and whether P-hat is in closed form. The
-/// environment is a renderer's own and does not change.
-type PrefilteredKey = (AccumulatedKey, f64, bool);
-/// What a quadtree depends on: flakes, seed, depth.
-type QuadtreeKey = (u64, f64, f64);
+/// What a prefiltered table depends on.
+#[derive(Clone, Copy, PartialEq)]
+struct PrefilteredKey {
+    accumulated: AccumulatedKey,
+    samples: f64,
+    /// Whether P-hat is in closed form.
+    closed: bool,
+    /// Which of the maps there have been.
+    environment: u64,
+}
 
-/// The tables of one material.
-pub(super) struct Tables {
-    pub accumulated: Accumulated,
-    pub prefiltered: Buffer,
-    prefiltered_for: Option<PrefilteredKey>,
+/// What a quadtree depends on: flakes, seed, depth.
+type QuadtreeKey = (u64, u32, u32);
+
+/// Counts of flakes.
+pub(super) struct Quadtree {
     pub nodes: Buffer,
     pub bounds: Buffer,
-    quadtree_for: Option<QuadtreeKey>,
+}
+
+/// All tables of the method.
+pub(super) struct Tables {
+    accumulated: Shared<AccumulatedKey, Buffer>,
+    prefiltered: Shared<PrefilteredKey, Buffer>,
+    quadtrees: Shared<QuadtreeKey, Quadtree>,
+    /// Stands for a prefiltered table where there is no environment: shaders bind it but do not read it.
+    no_environment: Buffer,
+}
+
+/// The tables that one material uses.
+pub(super) struct Used<'a> {
+    pub accumulated: &'a Buffer,
+    pub prefiltered: &'a Buffer,
+    pub quadtree: &'a Quadtree,
+}
+
+impl Default for Tables {
+    fn default() -> Self {
+        Self {
+            accumulated: Shared::default(),
+            prefiltered: Shared::default(),
+            quadtrees: Shared::default(),
+            no_environment: Buffer::new("prefiltered_absent", 16, Lifetime::Scene),
+        }
+    }
+}
+
+impl Tables {
+    /// Those of a material.
+    pub fn of(&self, material: &GlintMaterial) -> Option<Used<'_>> {
+        Some(Used {
+            accumulated: self.accumulated.of(material)?,
+            prefiltered: self.prefiltered.of(material).unwrap_or(&self.no_environment),
+            quadtree: self.quadtrees.of(material)?,
+        })
+    }
+
+    /// Declares the passes of every table that these materials use and that is not there.
+    pub fn update(
+        &mut self,
+        g: &mut Graph,
+        materials: &[GlintMaterial],
+        key: impl Fn(&GlintMaterial) -> AccumulatedKey,
+        dpf: &Shared<DpfSource, Buffer>,
+        environment: &EnvironmentTables,
+    ) {
+        self.accumulated.update(
+            materials,
+            |material| Some(key(material)),
+            |wanted| {
+                let table = dpf.get(wanted.key.2)?;
+                Some(dpf::accumulated(g, wanted, (&ALPHAS, table)))
+            },
+        );
+        let prefiltered = |material: &GlintMaterial| {
+            environment.is_simulated().then(|| PrefilteredKey {
+                accumulated: key(material),
+                samples: material.values.number("samples"),
+                closed: material.values.word("p_hat") == "closed",
+                environment: environment.generation(),
+            })
+        };
+        self.prefiltered.update(materials, prefiltered, |wanted| {
+            let accumulated = self.accumulated.get(wanted.key.accumulated)?;
+            Some(prefilter(g, wanted, accumulated, environment))
+        });
+        let quadtree = |material: &GlintMaterial| {
+            let [seed, depth] = ["seed", "depth"].map(|key| material.values.number(key) as u32);
+            Some((material.flakes(), seed, depth))
+        };
+        self.quadtrees.update(materials, quadtree, |wanted| Some(split(g, wanted)));
+    }
+}
+
+fn prefilter(
+    g: &mut Graph,
+    wanted: Wanted<PrefilteredKey, Buffer>,
+    accumulated: &Buffer,
+    environment: &EnvironmentTables,
+) -> Buffer {
+    let PrefilteredKey { accumulated: (alpha, ..), samples, closed, .. } = wanted.key;
+    let change = match wanted.before {
+        Some(before) if before.environment != wanted.key.environment => "the environment changed",
+        Some(before) if before.accumulated != wanted.key.accumulated => "P(i, o, gamma) changed",
+        Some(before) if before.samples != samples => "the number of samples changed",
+        Some(_) => "P-hat changed",
+        None => "first frame under this environment",
+    };
+    wanted.because(g, change);
+    let directions = c::PREFILTER_THETA_O * c::PREFILTER_PHI_O;
+    let mut probability = g.buffer("prefilter_probability", u64::from(directions) * 4);
+    let params = prefilter_probability::Params {
+        alpha: alpha as f32,
+        sin2_half_gamma: wanted.material.sin2_half_gamma() as f32,
+        closed: u32::from(closed),
+    };
+    let bind = prefilter_probability::Bind { accumulated, probability: &mut probability };
+    g.pass(bind, params, Extent::line(directions));
+    let new = || Buffer::new("prefiltered", PREFILTER_ENTRIES * 16, Lifetime::Settings);
+    let mut prefiltered = wanted.spare.unwrap_or_else(new);
+    let params = prefilter::Params { alpha: alpha as f32, samples: samples as u32 };
+    let bind = prefilter::Bind {
+        environment: environment.map(),
+        probability: &probability,
+        accumulated,
+        prefiltered: &mut prefiltered,
+    };
+    let rows = c::PREFILTER_THETA_N * c::PREFILTER_PHI_N * c::PREFILTER_THETA_O;
+    g.pass(bind, params, Extent::new(c::PREFILTER_PHI_O, rows));
+    prefiltered
 }
 
 /// Nodes of a quadtree with leaves at this level.
@@ -33,100 +149,27 @@ fn node_count(depth: u32) -> u64 {
     ((1u64 << (2 * (depth + 1))) - 1) / 3
 }
 
-fn table(what: &str, material: &str, bytes: u64) -> Buffer {
-    Buffer::new(format!("{what} {material}"), bytes, Lifetime::Settings)
-}
-
-impl Tables {
-    /// Tables that the first update fills. Without an environment there is nothing to prefilter.
-    pub fn new(material: &str, environment: bool) -> Self {
-        Self {
-            accumulated: Accumulated::new(material),
-            prefiltered: table("prefilter", material, if environment { PREFILTER_ENTRIES * 16 } else { 16 }),
-            prefiltered_for: None,
-            nodes: table("quadtree_nodes", material, 16),
-            bounds: table("quadtree_bounds", material, 16),
-            quadtree_for: None,
-        }
+fn split(g: &mut Graph, wanted: Wanted<QuadtreeKey, Quadtree>) -> Quadtree {
+    let (flakes, seed, depth) = wanted.key;
+    let change = match wanted.before {
+        Some((before, _, _)) if before != flakes => format!("count is now {}", Value::Number(flakes as f64)),
+        Some((_, before, _)) if before != seed => format!("seed is now {seed}"),
+        Some(_) => format!("depth is now {depth}"),
+        None => format!("first frame with {} flakes", Value::Number(flakes as f64)),
+    };
+    wanted.because(g, change);
+    let bytes = node_count(depth) * 16;
+    let new = || Quadtree {
+        nodes: Buffer::new("quadtree_nodes", bytes, Lifetime::Settings),
+        bounds: Buffer::new("quadtree_bounds", bytes, Lifetime::Settings),
+    };
+    let mut quadtree = wanted.spare.filter(|spare| spare.nodes.bytes() == bytes).unwrap_or_else(new);
+    for level in 0..depth {
+        let params = quadtree::Params { level, depth, flakes: flakes as f32, seed };
+        let bind = quadtree::Bind { nodes: &mut quadtree.nodes, bounds: &mut quadtree.bounds };
+        g.pass(bind, params, Extent::line(1 << (2 * level)));
     }
-
-    /// Declares the passes of every table that something changed for.
-    pub fn update(
-        &mut self,
-        g: &mut Graph,
-        material: &GlintMaterial,
-        (source, dpf): (DpfSource, &Buffer),
-        environment: &EnvironmentTables,
-    ) {
-        let accumulated = self.accumulated.update(g, material, alpha(material), (source, &ALPHAS, dpf));
-        let closed = material.values.word("p_hat") == "closed";
-        let prefiltered = (accumulated, material.values.number("samples"), closed);
-        if environment.present() && self.prefiltered_for != Some(prefiltered) {
-            self.prefilter(g, material, prefiltered, environment);
-        }
-        let quadtree = (material.flakes(), material.values.number("seed"), material.values.number("depth"));
-        if self.quadtree_for != Some(quadtree) {
-            self.split(g, material, quadtree);
-        }
-    }
-
-    fn prefilter(
-        &mut self,
-        g: &mut Graph,
-        material: &GlintMaterial,
-        key: PrefilteredKey,
-        environment: &EnvironmentTables,
-    ) {
-        let (accumulated, samples, closed) = key;
-        let change = match self.prefiltered_for {
-            Some((before, ..)) if before != accumulated => "P(i, o, gamma) changed",
-            Some((_, before, _)) if before != samples => "the number of samples changed",
-            Some(_) => "P-hat changed",
-            None => "first frame under this environment",
-        };
-        g.because(format!("material {}: {change}", material.name));
-        let directions = c::PREFILTER_THETA_O * c::PREFILTER_PHI_O;
-        let mut probability = g.buffer("prefilter_probability", u64::from(directions) * 4);
-        let bind = prefilter_probability::Bind { accumulated: &self.accumulated.table, probability: &mut probability };
-        let params = prefilter_probability::Params {
-            alpha: accumulated.0 as f32,
-            sin2_half_gamma: (material.solid_angle() / (4.0 * PI)) as f32,
-            closed: u32::from(closed),
-        };
-        g.pass(bind, params, Extent::line(directions));
-        let params = prefilter::Params { alpha: accumulated.0 as f32, samples: samples as u32 };
-        let bind = prefilter::Bind {
-            environment: environment.map(),
-            probability: &probability,
-            accumulated: &self.accumulated.table,
-            prefiltered: &mut self.prefiltered,
-        };
-        let rows = c::PREFILTER_THETA_N * c::PREFILTER_PHI_N * c::PREFILTER_THETA_O;
-        g.pass(bind, params, Extent::new(c::PREFILTER_PHI_O, rows));
-        self.prefiltered_for = Some(key);
-    }
-
-    fn split(&mut self, g: &mut Graph, material: &GlintMaterial, key: QuadtreeKey) {
-        let (flakes, seed, depth) = (key.0, key.1, key.2 as u32);
-        let change = match self.quadtree_for {
-            Some((before, _, _)) if before != flakes => format!("count is now {}", Value::Number(flakes as f64)),
-            Some((_, before, _)) if before != seed => format!("seed is now {seed}"),
-            Some(_) => format!("depth is now {depth}"),
-            None => format!("first frame with {} flakes", Value::Number(flakes as f64)),
-        };
-        g.because(format!("material {}: {change}", material.name));
-        let bytes = node_count(depth) * 16;
-        if self.nodes.bytes() != bytes {
-            self.nodes = table("quadtree_nodes", &material.name, bytes);
-            self.bounds = table("quadtree_bounds", &material.name, bytes);
-        }
-        for level in 0..depth {
-            let params = quadtree::Params { level, depth, flakes: flakes as f32, seed: seed as u32 };
-            let bind = quadtree::Bind { nodes: &mut self.nodes, bounds: &mut self.bounds };
-            g.pass(bind, params, Extent::line(1 << (2 * level)));
-        }
-        self.quadtree_for = Some(key);
-    }
+    quadtree
 }
 
 #[cfg(test)]

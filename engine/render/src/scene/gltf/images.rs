@@ -3,6 +3,7 @@
 use super::accessor::{Reader, named};
 use super::limits::LoadLimits;
 use super::source::Source;
+use crate::scene::contained::contained;
 use crate::scene::{Encoding, SceneError, SceneErrorCode, Texture, Wrap, memory};
 use ::gltf::json;
 use ::gltf::json::texture::{MagFilter, Sampler, WrappingMode};
@@ -12,7 +13,6 @@ use image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Cursor;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What the crate gives for the source of a texture that has none, as those in other formats.
 const NO_IMAGE: usize = u32::MAX as usize;
@@ -163,8 +163,7 @@ fn decode(
         ImageError::Limits(error) => too_large(error.to_string()),
         error => invalid(error.to_string()),
     };
-    // The decoders have not been seen to panic, but they meet bytes from anywhere.
-    let caught = catch_unwind(AssertUnwindSafe(|| {
+    let decode = || {
         let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
         let mut bounds = image::Limits::default();
         bounds.max_image_width = Some(limits.image_side);
@@ -193,8 +192,9 @@ fn decode(
             return Err(invalid(format!("texels of an unread kind, {color:?}")));
         }
         Ok((width, height, rgba))
-    }));
-    caught.unwrap_or_else(|_| Err(invalid("its decoder gave up on it".to_owned())))
+    };
+    // The decoders have not been seen to panic, but they meet bytes from anywhere.
+    contained(decode, invalid)
 }
 
 /// Converts what a PNG or JPEG holds; false for kinds that neither has.
@@ -226,4 +226,25 @@ fn append<const N: usize>(
 ) {
     let texels = decoded.chunks_exact(N * bytes);
     rgba.extend(texels.flat_map(|source| texel(std::array::from_fn(|k| channel(&source[k * bytes..])))));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn f43_a_decoder_of_images_that_panics_is_an_error_of_the_image() {
+        let mut png = Vec::new();
+        image::RgbImage::new(2, 1).write_to(&mut Cursor::new(&mut png), ImageFormat::Png).expect("it is encoded");
+        let limits = LoadLimits::default();
+        decode(&png, &limits, |_| Ok(()), "images[0]").expect("it is a good one");
+        // Memory is asked for in the middle of decoding.
+        let error = decode(&png, &limits, |_| panic!("injected"), "images[0]").expect_err("it panicked");
+        assert_eq!(error.code, SceneErrorCode::InvalidImage);
+        let said = error.to_string();
+        assert!(
+            said.contains("images[0]") && said.contains("its decoder gave up on it; save the image again"),
+            "{said}"
+        );
+    }
 }
