@@ -4,6 +4,7 @@
 //! A counter is written into the SPIR-V, and images get it in the place of what would be stored in them. Everything else stays
 //! as it is, buffers too. Loops whose length is a small constant, which drivers unroll, are not counted.
 
+use crate::spirv::{HEADER_WORDS, instructions, push};
 use crate::{Laboratory, StabilityError};
 use mica_gpu::Timing;
 use mica_graph::{
@@ -96,7 +97,6 @@ fn counting_shader(shader: &Shader) -> &'static Shader {
     Box::leak(Box::new(Shader { stages: Vec::leak(stages.collect()), ..*shader }))
 }
 
-const HEADER_WORDS: usize = 5;
 const OP_ENTRY_POINT: u32 = 15;
 const OP_CAPABILITY: u32 = 17;
 const OP_TYPE_BOOL: u32 = 20;
@@ -243,23 +243,4 @@ fn with_counter(words: &[u32]) -> Vec<u32> {
     }
     code[3] = bound;
     code
-}
-
-/// Operation and words of each instruction.
-fn instructions(words: &[u32]) -> impl Iterator<Item = (u32, &[u32])> {
-    let mut rest = &words[HEADER_WORDS..];
-    std::iter::from_fn(move || {
-        let length = (rest.first()? >> 16) as usize;
-        let (whole, after) = rest.split_at_checked(length.max(1))?;
-        rest = after;
-        Some((whole[0] & 0xffff, whole))
-    })
-}
-
-fn push(code: &mut Vec<u32>, operation: u32, operands: impl IntoIterator<Item = u32>) {
-    let at = code.len();
-    code.push(operation);
-    code.extend(operands);
-    let words = (code.len() - at) as u32;
-    code[at] |= words << 16;
 }

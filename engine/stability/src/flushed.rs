@@ -5,6 +5,7 @@
 //! into the SPIR-V, after each load, each read of an image, each conversion and each arithmetic instruction that gives floats,
 //! vectors or matrices of them. What only moves bits (bitcasts, selections, swizzles) gives what it was given.
 
+use crate::spirv::{HEADER_WORDS, instructions, push};
 use mica_graph::{Graph, Shader, StageCode, Work};
 use std::collections::HashMap;
 
@@ -36,7 +37,6 @@ fn flushed_shader(shader: &Shader, below: f32) -> &'static Shader {
     Box::leak(Box::new(Shader { stages: Vec::leak(stages.collect()), ..*shader }))
 }
 
-const HEADER_WORDS: usize = 5;
 const OP_EXT_INST: u32 = 12;
 const OP_TYPE_BOOL: u32 = 20;
 const OP_TYPE_INT: u32 = 21;
@@ -206,25 +206,6 @@ impl<'a> Module<'a> {
         push(code, OP_U_LESS_THAN, [width.flags_type, small, magnitude, width.threshold]);
         push(code, OP_SELECT, [of_type, result, small, width.zero, raw]);
     }
-}
-
-/// Operation and words of each instruction.
-fn instructions(words: &[u32]) -> impl Iterator<Item = (u32, &[u32])> {
-    let mut rest = &words[HEADER_WORDS..];
-    std::iter::from_fn(move || {
-        let length = (rest.first()? >> 16) as usize;
-        let (whole, after) = rest.split_at_checked(length.max(1))?;
-        rest = after;
-        Some((whole[0] & 0xffff, whole))
-    })
-}
-
-fn push(code: &mut Vec<u32>, operation: u32, operands: impl IntoIterator<Item = u32>) {
-    let at = code.len();
-    code.push(operation);
-    code.extend(operands);
-    let words = (code.len() - at) as u32;
-    code[at] |= words << 16;
 }
 
 #[cfg(test)]

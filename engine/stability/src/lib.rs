@@ -14,6 +14,7 @@ mod flushed;
 mod laboratory;
 mod random;
 mod rays;
+mod spirv;
 mod stage;
 mod sweeps;
 mod unary;
