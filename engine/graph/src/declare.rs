@@ -339,6 +339,21 @@ impl Graph {
         exchanged
     }
 
+    /// Copies to a resource what the passes declared since there were so many would make of it, in their place: under the name of
+    /// the last of them, and for another reason.
+    ///
+    /// # Panics
+    /// If the sizes differ: a mistake of the pass's author, not of any input.
+    pub fn upload_instead(&mut self, passes: usize, resource: &Arc<Resource>, data: Arc<[u8]>, why: &str) {
+        let name = self.passes.last().filter(|_| passes < self.passes.len()).map(|pass| pass.name.clone());
+        self.passes.truncate(passes);
+        self.upload_resource(resource, data);
+        if let Some(upload) = self.passes.last_mut() {
+            why.clone_into(&mut upload.why);
+            upload.name = name.unwrap_or_else(|| std::mem::take(&mut upload.name));
+        }
+    }
+
     /// Appends a pass of another graph with other work: everything else is as there.
     pub fn push_with(&mut self, pass: &Pass, work: Work) {
         self.passes.push(Pass { work, ..pass.clone() });

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 const MAGIC: &[u8; 8] = b"MICA\x01\r\n\x1a";
 const HEADER_BYTES: usize = 8 + 8 + 8 + 32;
-const ENDIANNESS_AND_VERSION: u64 = 0x0102_0304_0506_0001;
+const ENDIANNESS_AND_VERSION: u64 = 0x0102_0304_0506_0002;
 
 /// Why an entry was not used.
 #[derive(Debug, thiserror::Error)]
@@ -66,7 +66,7 @@ impl Cache {
     /// The bytes stored under `key`; `None` if there are none.
     pub fn load(&self, key: &str) -> Result<Option<Vec<u8>>, CacheError> {
         let path = self.path(key);
-        match open(&path).and_then(|(file, bytes)| read(file, bytes)) {
+        match open(&path).and_then(|(file, bytes)| read(key, file, bytes)) {
             Ok(Some(payload)) => Ok(Some(payload)),
             Ok(None) => Err(CacheError::Damaged { path }),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
@@ -78,18 +78,18 @@ impl Cache {
     pub fn store(&self, key: &str, payload: &[u8]) -> Result<(), CacheError> {
         let path = self.path(key);
         fs::create_dir_all(&self.folder)
-            .and_then(|()| mica_files::replace(&path, &[&header(payload), payload]))
+            .and_then(|()| mica_files::replace(&path, &[&header(key, payload), payload]))
             .map_err(|source| CacheError::Io { path, source })
     }
 
     /// The file of an entry, as bytes.
-    pub fn entry(payload: &[u8]) -> Vec<u8> {
-        [&header(payload)[..], payload].concat()
+    pub fn entry(key: &str, payload: &[u8]) -> Vec<u8> {
+        [&header(key, payload)[..], payload].concat()
     }
 
-    /// What the bytes of an entry's file hold; none when they are not those that were written.
-    pub fn payload(entry: &[u8]) -> Option<Vec<u8>> {
-        read(entry, entry.len() as u64).ok().flatten()
+    /// What the bytes of an entry's file hold; none when they are not those that were written under `key`.
+    pub fn payload(key: &str, entry: &[u8]) -> Option<Vec<u8>> {
+        read(key, entry, entry.len() as u64).ok().flatten()
     }
 
     fn path(&self, key: &str) -> PathBuf {
@@ -106,8 +106,11 @@ fn start_of_header(payload_bytes: u64) -> [u8; 24] {
     start
 }
 
-fn header(payload: &[u8]) -> Vec<u8> {
-    [&start_of_header(payload.len() as u64)[..], blake3::hash(payload).as_bytes()].concat()
+/// The checksum is of the key too: a file that was renamed is none of that name.
+fn header(key: &str, payload: &[u8]) -> Vec<u8> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&(key.len() as u64).to_le_bytes()).update(key.as_bytes()).update(payload);
+    [&start_of_header(payload.len() as u64)[..], hasher.finalize().as_bytes()].concat()
 }
 
 /// A regular file and its length.
@@ -122,7 +125,7 @@ fn open(path: &Path) -> io::Result<(fs::File, u64)> {
 
 /// The payload of an entry's file of that length; none when it is damaged. A file that is none of ours is told by its
 /// header, so that its length, which may be anything, costs nothing.
-fn read(mut file: impl Read, file_bytes: u64) -> io::Result<Option<Vec<u8>>> {
+fn read(key: &str, mut file: impl Read, file_bytes: u64) -> io::Result<Option<Vec<u8>>> {
     let mut header = Vec::with_capacity(HEADER_BYTES);
     file.by_ref().take(HEADER_BYTES as u64).read_to_end(&mut header)?;
     let payload_bytes = file_bytes.saturating_sub(HEADER_BYTES as u64);
@@ -132,7 +135,7 @@ fn read(mut file: impl Read, file_bytes: u64) -> io::Result<Option<Vec<u8>>> {
     let mut payload = Vec::new();
     payload.try_reserve_exact(payload_bytes as usize)?;
     file.take(payload_bytes).read_to_end(&mut payload)?;
-    Ok((header == self::header(&payload)).then_some(payload))
+    Ok((header == self::header(key, &payload)).then_some(payload))
 }
 
 #[cfg(test)]
@@ -158,7 +161,10 @@ mod tests {
         cache.store("table", &[7; 100]).unwrap();
         let path = cache.path("table");
         let whole = fs::read(&path).unwrap();
-        assert_eq!((whole.clone(), Cache::payload(&whole)), (Cache::entry(&[7; 100]), Some(vec![7; 100])));
+        let entry = Cache::entry("table", &[7; 100]);
+        assert_eq!((&entry, Cache::payload("table", &whole)), (&whole, Some(vec![7; 100])));
+        fs::write(cache.path("another"), &whole).unwrap();
+        assert!(matches!(cache.load("another"), Err(CacheError::Damaged { .. })), "renamed");
         for at in 0..whole.len() {
             let mut damaged = whole.clone();
             damaged[at] ^= 0x10;

@@ -2,6 +2,7 @@
 //! nothing does.
 
 use crate::census::EnvironmentCensus;
+use crate::kept::{Inputs, Kept};
 use crate::passes;
 use crate::scene::{EquirectMap, SmallLight};
 use mica_graph::{Buffer, Extent, Format, Graph, Image, ImageDesc, Lifetime};
@@ -73,6 +74,7 @@ pub(crate) struct Called {
 struct Absent {
     irradiance: Image,
     lobe: Lobe,
+    cones: Cones,
 }
 
 /// The environment, or its absence.
@@ -112,8 +114,8 @@ impl EnvironmentTables {
         let fits = levels.iter().position(|level| level.width <= CONE_MAP_WIDTH).unwrap_or(0);
         let cone_map = levels.swap_remove(fits);
         let one = Extent::new(1, 1);
-        let absent = ["irradiance_absent", "environment_absent", "albedo_absent"].map(str::to_owned);
-        let [irradiance, prefiltered, albedo] = absent;
+        let absent = ["irradiance", "environment", "albedo", "environment_cone", "light_rings", "small_lights"];
+        let [irradiance, prefiltered, albedo, cone, rings, lights] = absent.map(|table| format!("{table}_absent"));
         Self {
             census: map.map(|_| EnvironmentCensus::of(size, &cone_map, bad_texels)),
             map: Image::new("environment", desc, Lifetime::Scene),
@@ -126,6 +128,12 @@ impl EnvironmentTables {
             absent: Absent {
                 irradiance: Image::new(irradiance, ImageDesc::new(Format::Rgba32Float, one), Lifetime::Scene),
                 lobe: Lobe::of_size(&[prefiltered, albedo], [one, one], 1),
+                cones: Cones {
+                    means: Image::new(cone, ImageDesc::new(Format::Rgba32Float, one), Lifetime::Scene),
+                    rings: Image::new(rings, rings_desc(1, [1, 1]), Lifetime::Scene),
+                    lights: Buffer::new(lights, size_of::<types::SmallLight>() as u64, Lifetime::Scene),
+                    light_count: 0,
+                },
             },
             is_simulated: false,
             generation,
@@ -180,9 +188,9 @@ impl EnvironmentTables {
         self.beckmann.as_ref().unwrap_or(&self.absent.lobe)
     }
 
-    /// What flakes whose cones have this half-angle mirror, where it was called for.
-    pub fn cones(&self, half_angle_radians: f64) -> Option<&Cones> {
-        self.cones.get(&half_angle_radians.to_bits())
+    /// What flakes whose cones have this half-angle mirror.
+    pub fn cones(&self, half_angle_radians: f64) -> &Cones {
+        self.cones.get(&half_angle_radians.to_bits()).unwrap_or(&self.absent.cones)
     }
 
     /// Whether the last frame was called for an environment, be it a black one.
@@ -192,7 +200,7 @@ impl EnvironmentTables {
 
     /// Declares the upload of the map and the tables that base shading calls for, where they are not there yet; gives back those
     /// that nothing calls for.
-    pub fn update(&mut self, g: &mut Graph, simulated: bool, called: Called) {
+    pub fn update(&mut self, g: &mut Graph, kept: &mut Kept, simulated: bool, called: Called) {
         self.exchanged = None;
         self.is_simulated = simulated;
         if simulated && let Some(bytes) = self.pending.take() {
@@ -204,15 +212,15 @@ impl EnvironmentTables {
         } else if self.irradiance.is_none() {
             g.because("diffuse surfaces under the environment; first frame with this map");
             let desc = ImageDesc::new(Format::Rgba32Float, Extent::new(64, 32));
-            let mut irradiance = Image::new("environment_irradiance", desc, Lifetime::Scene);
-            passes::environment::irradiance(g, &self.map, &mut irradiance);
-            self.irradiance = Some(irradiance);
+            let table = Image::new("environment_irradiance", desc, Lifetime::Scene);
+            let make = |g: &mut Graph, table: &mut Image| passes::environment::irradiance(g, &self.map, table);
+            self.irradiance = Some(kept.table(g, self.inputs(), table, make));
         }
         if !called.ggx {
             self.ggx = None;
         } else if self.ggx.is_none() {
             g.because("smooth reflections of the environment; first frame with this map");
-            self.ggx = Some(lobe(g, &self.map, Ndf::Ggx));
+            self.ggx = Some(self.lobe(g, kept, Ndf::Ggx));
         }
     }
 
@@ -224,45 +232,65 @@ impl EnvironmentTables {
         self.cones.retain(|kept, _| half_angles_radians.iter().any(|half_angle| half_angle.to_bits() == *kept));
     }
 
-    /// What flakes whose cones have this half-angle mirror: declares the uploads, the first time.
+    /// What flakes whose cones have this half-angle mirror: declares the uploads, the first time, where there is an environment.
     ///
     /// Computed here, in f64: this is what other methods are held against. A light that is larger than a cone is left in the map, which is
     /// fine enough for it.
-    pub fn call_for_cones(&mut self, g: &mut Graph, half_angle_radians: f64) {
-        if self.cones(half_angle_radians).is_some() {
+    pub fn call_for_cones(&mut self, g: &mut Graph, kept: &mut Kept, half_angle_radians: f64) {
+        if !self.is_simulated || self.cones.contains_key(&half_angle_radians.to_bits()) {
             return;
         }
         let (mut lights, _) = self.cone_map.part_small_lights();
         lights.retain(|light| light.radius_radians <= half_angle_radians);
         // As fine as the map, within reason, and never so coarse that linear interpolation shows.
         let width = if self.census.is_some() { self.cone_map.width.clamp(256, 1024) } else { 1 };
-        let means = self.cone_map.without(&lights).cone_means(half_angle_radians, width);
-        let extent = Extent::new(means.width, means.height);
+        let extent = Extent::new(width, (width / 2).max(1));
         let mut table = Image::new("environment_cone", ImageDesc::new(Format::Rgba32Float, extent), Lifetime::Settings);
-        g.upload_image(&mut table, rgba_bytes(&means.texels));
+        let inputs = self.inputs().map(|inputs| {
+            let code = [include_str!("scene/cone_means.rs"), include_str!("scene/small_lights.rs")];
+            inputs.and(format_args!("{half_angle_radians} {code:?}"))
+        });
+        let means = kept.bytes(inputs, &table, || {
+            rgba_bytes(&self.cone_map.without(&lights).cone_means(half_angle_radians, width).texels)
+        });
+        g.upload_image(&mut table, means);
         let (rings, buffer) = upload_lights(g, &lights, half_angle_radians);
         let cones = Cones { means: table, rings, lights: buffer, light_count: lights.len() as u32 };
         self.cones.insert(half_angle_radians.to_bits(), cones);
     }
 
     /// Declares the passes that fill the tables of the flakes' smooth limit, the first time, where there is an environment.
-    pub fn call_for_beckmann(&mut self, g: &mut Graph) {
+    pub fn call_for_beckmann(&mut self, g: &mut Graph, kept: &mut Kept) {
         if self.beckmann.is_none() && self.is_simulated {
-            self.beckmann = Some(lobe(g, &self.map, Ndf::Beckmann));
+            self.beckmann = Some(self.lobe(g, kept, Ndf::Beckmann));
         }
+    }
+
+    /// What tables that are made from the map alone depend on; none without a map.
+    pub fn inputs(&self) -> Option<Inputs> {
+        // The map is repaired, and its levels are made, by this code.
+        let code = include_str!("scene/environment.rs");
+        self.fingerprint.as_ref().map(|map| Inputs::default().and(format_args!("{map}")).and(format_args!("{code}")))
+    }
+
+    /// The tables of a lobe; declares what fills them.
+    fn lobe(&self, g: &mut Graph, kept: &mut Kept, ndf: Ndf) -> Lobe {
+        let Lobe { prefiltered, mut albedo } = Lobe::new(ndf);
+        let make = |g: &mut Graph, table: &mut Image| passes::environment::specular(g, &self.map, ndf, table);
+        let prefiltered = kept.table(g, self.inputs(), prefiltered, make);
+        passes::environment::albedo(g, ndf, &mut albedo);
+        Lobe { prefiltered, albedo }
     }
 }
 
-/// The tables of a lobe; declares the passes that fill them.
-fn lobe(g: &mut Graph, map: &Image, ndf: Ndf) -> Lobe {
-    let mut lobe = Lobe::new(ndf);
-    passes::environment::specular(g, map, ndf, &mut lobe);
-    lobe
-}
 /// Texels as an image of four channels holds them.
 fn rgba_bytes<'a>(texels: impl IntoIterator<Item = &'a [f32; 3]>) -> Arc<[u8]> {
     let texels: Vec<[f32; 4]> = texels.into_iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
     Arc::from(bytemuck::cast_slice::<_, u8>(&texels))
+}
+
+fn rings_desc(layers: u32, [width, height]: [u32; 2]) -> ImageDesc {
+    ImageDesc { layers, ..ImageDesc::new(Format::Rgba32Float, Extent::new(width, height)) }
 }
 
 /// The rings of lights, one a layer, and the lights; black ones where there are none.
@@ -286,10 +314,7 @@ fn upload_lights(g: &mut Graph, lights: &[SmallLight], half_angle_radians: f64) 
         texels.push([0.0; 3]);
         described.push(bytemuck::Zeroable::zeroed());
     }
-    let desc = ImageDesc {
-        layers: described.len() as u32,
-        ..ImageDesc::new(Format::Rgba32Float, Extent::new(size[0], size[1]))
-    };
+    let desc = rings_desc(described.len() as u32, size);
     let mut rings = Image::new("light_rings", desc, Lifetime::Settings);
     g.upload_image(&mut rings, rgba_bytes(&texels));
     let bytes: Arc<[u8]> = Arc::from(bytemuck::cast_slice::<_, u8>(&described));

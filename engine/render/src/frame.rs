@@ -6,7 +6,7 @@ use crate::methods::{self, Finish, Reads, Shading};
 use crate::passes::GlintTiles;
 use crate::renderer::{Renderer, glints};
 use crate::scene::{AlphaMode, Material, Scene};
-use crate::{GlintMaterial, OcclusionBackend, RaysOfPass, RenderError, View, passes};
+use crate::{GlintMaterial, MadeTable, OcclusionBackend, RaysOfPass, RenderError, View, passes};
 use mica_graph::{Buffer, Effects, Extent, Format, Graph, Image, ImageDesc, Lifetime};
 use mica_shaders::{effects as e, types};
 use std::sync::Arc;
@@ -54,6 +54,8 @@ pub struct Frame {
     /// The effects that its shaders are specialised for. Passes that the caller declares next on the same graph are so too, until
     /// [`Graph::specialize`] says otherwise.
     pub effects: Effects,
+    /// The tables that it makes and brings back, where a cache was asked for them in vain ([`Renderer::keep_tables`]).
+    pub made: Vec<MadeTable>,
     /// What the frame does without.
     pub left_out: Vec<LeftOut>,
 }
@@ -154,6 +156,7 @@ impl Renderer {
             updates,
             rays,
             effects,
+            made: self.kept.take_made(),
             left_out,
         })
     }
@@ -191,7 +194,7 @@ impl Renderer {
         let irradiance = effects.contains(e::ENVIRONMENT | e::DIFFUSE);
         let mirrors = effects.contains(e::SMOOTH_SPECULAR) || effects.contains(e::CLEAR_COAT);
         let ggx = effects.contains(e::ENVIRONMENT) && mirrors;
-        self.environment.update(g, effects.contains(e::ENVIRONMENT), Called { irradiance, ggx });
+        self.environment.update(g, &mut self.kept, effects.contains(e::ENVIRONMENT), Called { irradiance, ggx });
         let mut lobe = false;
         let mut cones = Vec::new();
         for material in glinting {
@@ -207,13 +210,13 @@ impl Renderer {
             match reads {
                 Reads::Lobe => {
                     g.because(format!("material {name}: smooth lobe under the environment; first frame"));
-                    self.environment.call_for_beckmann(g);
+                    self.environment.call_for_beckmann(g, &mut self.kept);
                 }
                 Reads::Cones => {
                     g.because(format!(
                         "material {name}: what cones of {gamma_deg} degrees mirror; first frame with them"
                     ));
-                    self.environment.call_for_cones(g, gamma_deg.to_radians());
+                    self.environment.call_for_cones(g, &mut self.kept, gamma_deg.to_radians());
                 }
                 Reads::Map => {}
             }
@@ -222,7 +225,7 @@ impl Renderer {
         let of = |name: &'static str| glinting.iter().filter(move |material| material.method.name == name);
         self.methods.retain(|name, _| of(name).next().is_some());
         for (name, method) in self.methods.iter_mut().filter(|_| seen) {
-            method.update(g, &of(name).cloned().collect::<Vec<_>>(), &self.environment);
+            method.update(g, &mut self.kept, &of(name).cloned().collect::<Vec<_>>(), &self.environment);
         }
     }
 

@@ -2,6 +2,11 @@
 //!
 //! [`Renderer::frame`] declares a frame on a [`mica_graph::Graph`]; whoever owns the graph plans and executes it: an
 //! [`mica_gpu::Executor`] on a device of its own, or one that records into a host's command buffer.
+//!
+//! Without the feature `glints` there are no methods, and nothing glints: to compare with what their presence costs where they are
+//! not called for, which is nothing (`examples/plain_frames.rs`).
+
+#![cfg_attr(not(feature = "glints"), allow(unused, reason = "much serves methods alone"))]
 
 mod cache;
 mod census;
@@ -9,6 +14,7 @@ mod embedded;
 mod environment_tables;
 mod filled;
 mod frame;
+mod kept;
 mod methods;
 mod moved;
 mod occluders;
@@ -23,10 +29,12 @@ pub use cache::{Cache, CacheError};
 pub use census::{Census, Effect, EnvironmentCensus, GlintCensus, LightCensus, MaterialCensus};
 pub use embedded::{EMBEDDED_SCENES, EmbeddedScene, embedded_scene};
 pub use frame::{Frame, LeftOut};
+pub use kept::MadeTable;
 pub use methods::{
-    AUTO_METHOD, COMMON_SETTINGS, Claim, DEFAULT_METHOD, GlintMaterial, JakobTable, METHODS, MethodInfo, Rung,
-    check_method, lit_probability_table, method,
+    AUTO_METHOD, COMMON_SETTINGS, Claim, DEFAULT_METHOD, GlintMaterial, METHODS, MethodInfo, Rung, check_method, method,
 };
+#[cfg(feature = "glints")]
+pub use methods::{JakobTable, lit_probability_table};
 /// What [`Renderer::trace`] reads and writes.
 pub use mica_shaders::types::{Ray, RayAnswer, RayCounts};
 pub use occluders::{OcclusionBackend, RaysOfPass};

@@ -3,6 +3,7 @@
 use crate::census::{Census, Counted, LightCensus};
 use crate::environment_tables::EnvironmentTables;
 use crate::frame::{unrendered, with_layers};
+use crate::kept::Kept;
 use crate::methods::{self, Method};
 use crate::occluders::Occluders;
 use crate::scene::{Atlas, AtlasLimits, EquirectMap, Light, Material, Scene};
@@ -12,7 +13,7 @@ use crate::{
     AUTO_METHOD, Cache, DEFAULT_METHOD, GlintMaterial, MethodInfo, OcclusionBackend, Question, RenderError, passes,
 };
 use glam::{DAffine3, DVec3};
-use mica_gpu::Executor;
+use mica_gpu::{DeviceInfo, Executor};
 use mica_graph::{Buffer, Effects, Extent, Format, Graph, Image, ImageDesc, Lifetime, Pass, ResourceId};
 use mica_shaders::constants as c;
 use std::collections::BTreeMap;
@@ -58,6 +59,8 @@ pub struct Renderer {
     pub(crate) newest: Option<ResourceId>,
     materials: Vec<GlintMaterial>,
     pub(crate) methods: BTreeMap<&'static str, Box<dyn Method>>,
+    /// Tables that are kept between runs.
+    pub(crate) kept: Kept,
     /// Effects that are simulated whatever the census says.
     pub(crate) forced: Effects,
     /// Stands for the shadow mask where there is none: shaders bind it but do not read it.
@@ -102,6 +105,7 @@ impl Renderer {
             newest: None,
             materials,
             methods: BTreeMap::new(),
+            kept: Kept::default(),
             forced: Effects::NONE,
             no_shadows: Image::new("no_shadows", one, Lifetime::Scene),
             mean: None,
@@ -309,6 +313,13 @@ impl Renderer {
         Ok(updates)
     }
 
+    /// From now on, frames on this device take tables that are dear to make from a cache where it has them, and bring the others
+    /// back to be stored there ([`Frame::made`](crate::Frame::made)); with `None`, which is how a renderer starts, they make all they
+    /// need. Bytes are the same either way.
+    pub fn keep_tables(&mut self, cache: Option<(Cache, &DeviceInfo)>) {
+        self.kept = cache.map(|(cache, device)| Kept::new(cache, device)).unwrap_or_default();
+    }
+
     /// Declares rays of the caller's own: each of the first `count` in `rays`, [`Ray`](crate::Ray)s in scene space, gets a
     /// [`RayAnswer`](crate::RayAnswer) in `answers`. Returns the [`RayCounts`](crate::RayCounts). There may be as many as the
     /// device lets a shader bind (`max_storage_buffer_range_bytes` in [`mica_gpu::Limits`]): a run refuses more. What the occluders need is brought up to date
@@ -391,7 +402,7 @@ fn check_lights(lights: &[Light]) -> Result<(), RenderError> {
 
 /// A material as it glints, if it does, with the settings that its file gives it.
 fn glint_material(index: usize, material: &Material) -> Option<GlintMaterial> {
-    let glint = material.glint.as_ref()?;
+    let glint = material.glint.as_ref().filter(|_| cfg!(feature = "glints"))?;
     let asked = glint.method.as_deref().unwrap_or(DEFAULT_METHOD);
     let chosen = (asked == AUTO_METHOD).then(String::new);
     let info = methods::method(if chosen.is_some() { DEFAULT_METHOD } else { asked }).unwrap_or_else(|error| {

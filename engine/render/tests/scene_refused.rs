@@ -477,3 +477,19 @@ fn an_error_is_one_line_however_the_file_names_things() {
     let line = document.load().expect_err("refused").to_string();
     assert!(!line.contains(['\n', '\u{1b}']) && line.len() < 1000, "{line}");
 }
+
+#[test]
+fn lights_of_no_power_that_sums_can_hold_are_refused() {
+    for light in [
+        json!({ "type": "point", "intensity": 1e38 }),
+        json!({ "type": "directional", "color": [1e30, 0, 0], "intensity": 1e30 }),
+        json!({ "type": "spot", "intensity": 1.1e12, "spot": {} }),
+        json!({ "type": "point", "intensity": -1 }),
+    ] {
+        let mut document = Document::square();
+        document.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+        document.json["extensions"]["KHR_lights_punctual"]["lights"] = json!([light]);
+        document.json["nodes"][0]["extensions"]["KHR_lights_punctual"]["light"] = json!(0);
+        document.refused(Code::ValueNotInRange, "nodes[0].extensions.KHR_lights_punctual.light");
+    }
+}

@@ -89,6 +89,8 @@ pub struct Module {
     specializations: HashMap<u32, Option<bool>>,
     /// What the code refers to otherwise.
     values: HashSet<u32>,
+    /// Constants that are made of others, each with those, in order.
+    derived: Vec<(u32, Vec<u32>)>,
 }
 
 impl Module {
@@ -111,6 +113,12 @@ impl Module {
             };
             module.instruction(opcode, operands);
             rest = &rest[count..];
+        }
+        // A constant made of others uses them only if it is used itself. Each comes after those that it is made of.
+        for (id, arguments) in module.derived.iter().rev() {
+            if module.values.contains(id) {
+                module.values.extend(arguments);
+            }
         }
         Ok(module)
     }
@@ -168,8 +176,10 @@ impl Module {
                 self.pointers.insert(*pointer);
                 self.values.extend(rest);
             }
-            // What takes a boolean: other specialisation constants, logic, selections, phis, branches and returns.
-            (52 | 80 | 164..=169 | 245, [_, _, arguments @ ..]) => self.values.extend(arguments),
+            // OpSpecConstantOp: its operation, then what it takes.
+            (52, [_, id, _, arguments @ ..]) => self.derived.push((*id, arguments.to_vec())),
+            // What takes a boolean: logic, selections, phis, branches and returns.
+            (80 | 164..=169 | 245, [_, _, arguments @ ..]) => self.values.extend(arguments),
             (250 | 254, arguments) => self.values.extend(arguments),
             (63, [to, from, ..]) => self.pointers.extend([to, from]),
             _ => {}

@@ -4,6 +4,9 @@ use crate::corpus::gltf::with_image;
 use mica_render::Cache;
 use mica_render::scene::{EquirectMap, LoadLimits, Scene};
 
+/// What entries of the cache are stored under.
+pub const CACHE_KEY: &str = "table";
+
 /// So little that thousands of inputs a second leave the machine alone; the checks are the same.
 fn limits() -> LoadLimits {
     LoadLimits { image_bytes: 1 << 22, total_bytes: 1 << 24, instances: 1 << 12, ..LoadLimits::default() }
@@ -41,9 +44,9 @@ pub fn jpeg(bytes: &[u8]) -> bool {
 
 /// An entry of the cache; true where it is one that was written.
 pub fn cache(bytes: &[u8]) -> bool {
-    let payload = Cache::payload(bytes);
+    let payload = Cache::payload(CACHE_KEY, bytes);
     if let Some(payload) = &payload {
-        assert_eq!(Cache::entry(payload), bytes, "the checksum of other bytes was taken");
+        assert_eq!(Cache::entry(CACHE_KEY, payload), bytes, "the checksum of other bytes was taken");
     }
     payload.is_some()
 }

@@ -3,7 +3,9 @@
 
 use crate::error::{Failure, INTERRUPTED};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::flag;
+use signal_hook::iterator::Signals;
+use signal_hook::{flag, low_level};
+use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -18,19 +20,40 @@ impl Interrupt {
     /// Ctrl-C, or a polite request to end, ends the process at once, with the code for it.
     pub fn new() -> Result<Self, Failure> {
         let interrupt = Self { at_once: Arc::new(AtomicBool::new(true)), requested: Arc::default() };
-        let register = |signal| {
-            let Self { at_once, requested } = &interrupt;
-            // In this order: the first one of a graceful section does not end the process, the second does.
-            flag::register_conditional_shutdown(signal, i32::from(INTERRUPTED), at_once.clone())?;
-            flag::register(signal, at_once.clone())?;
-            flag::register(signal, requested.clone())
-        };
         // A terminal that is closed, unless `nohup` asked for that to be survived.
         let hangup = (!is_ignored(SIGHUP)).then_some(SIGHUP);
-        match [SIGINT, SIGTERM].into_iter().chain(hangup).try_for_each(|signal| register(signal).map(|_| ())) {
+        let signals: Vec<i32> = [SIGINT, SIGTERM].into_iter().chain(hangup).collect();
+        match interrupt.listen(&signals) {
             Ok(()) => Ok(interrupt),
             Err(error) => Err(Failure::bad_input(format!("Ctrl-C cannot be handled: {error}"))),
         }
+    }
+
+    /// Hears signals on a thread of their own, which may say why the process ends: a handler may not.
+    fn listen(&self, signals: &[i32]) -> io::Result<()> {
+        let ending = Arc::new(AtomicBool::new(false));
+        for signal in signals {
+            // Where nobody reads the line, the next one ends the process without.
+            flag::register_conditional_shutdown(*signal, i32::from(INTERRUPTED), ending.clone())?;
+        }
+        let mut heard = Signals::new(signals)?;
+        let (at_once, requested) = (self.at_once.clone(), self.requested.clone());
+        let listener = std::thread::Builder::new().name("signals".to_owned());
+        listener.spawn(move || {
+            for _ in heard.forever() {
+                let again = requested.swap(true, Ordering::SeqCst);
+                // The first one of a graceful section does not end the process, the second does.
+                if !at_once.swap(true, Ordering::SeqCst) {
+                    continue;
+                }
+                ending.store(true, Ordering::SeqCst);
+                let what = if again { "interrupted again: what was under way is given up" } else { "interrupted" };
+                // Nobody may be left to hear it.
+                let _ = writeln!(io::stderr(), "mica: {what}");
+                low_level::exit(i32::from(INTERRUPTED));
+            }
+        })?;
+        Ok(())
     }
 
     /// From here on there is something to keep: the first Ctrl-C is only remembered.

@@ -3,7 +3,7 @@
 use crate::args::{RenderArgs, TimingChoice};
 use crate::budget::{self, BudgetReport};
 use crate::edit::Edit;
-use crate::error::{Failure, INTERRUPTED};
+use crate::error::{Failure, INTERRUPTED, NO_MEMORY};
 use crate::interrupt::Interrupt;
 use crate::measure::{self, Measurements, PassRow, PassSum};
 use crate::output::{self, Destination};
@@ -29,10 +29,18 @@ pub fn render(args: &RenderArgs, interrupt: &Interrupt) -> Result<(), Failure> {
     let started = Instant::now();
     let outputs = Outputs::check(args)?;
     let mut progress = Progress::new(args.quiet);
-    let made = match Made::new(args, interrupt, &mut progress, started) {
-        Err(failure) if Spare::default().serves(&failure) => Made::new(args, interrupt, &mut progress, started),
-        made => made,
-    }?;
+    // Whether the first frame is under way.
+    let mut starts = false;
+    let mut make = |keep_tables| Made::new(args, interrupt, &mut progress, started, (keep_tables, &mut starts));
+    let mut made = make(true);
+    if made.as_ref().is_err_and(|failure| Spare::default().serves(failure)) {
+        made = make(true);
+    }
+    if made.as_ref().is_err_and(|failure| failure.code == NO_MEMORY && !failure.device_lost) && starts {
+        // Tables that are kept travel through memory, all at once, and are never needed.
+        made = Made::new(args, interrupt, &mut progress, started, (false, &mut starts));
+    }
+    let made = made?;
     progress.clear();
     let Made { session, budget, updates, start, shot, samples, warmup, measurements } = made;
 
@@ -98,6 +106,7 @@ impl Made {
         interrupt: &Interrupt,
         progress: &mut Progress,
         started: Instant,
+        (keep_tables, starts): (bool, &mut bool),
     ) -> Result<Self, Failure> {
         let (mut session, budget) = match args.budget.wish() {
             Some(wish) => {
@@ -110,7 +119,9 @@ impl Made {
             edit.check(&session)?;
         }
         let mut work = Work { session: &mut session, interrupt, progress, frames: 0, updates: Vec::new() };
-        work.update(None)?;
+        *starts = true;
+        work.start(keep_tables)?;
+        *starts = false;
         let start = StartReport::new(started.elapsed(), work.session.executor.pipelines());
         for edit in &args.edit {
             edit.apply(work.session, work.progress)?;
@@ -186,6 +197,14 @@ impl Work<'_> {
         let shot = self.session.frame(sample, timing, picture)?;
         self.note(&shot, None);
         Ok(shot)
+    }
+
+    /// Makes the first frame, from the tables of earlier runs if they are kept. What edits cost does not depend on those.
+    fn start(&mut self, keep_tables: bool) -> Result<(), Failure> {
+        self.session.keep_tables(keep_tables);
+        self.update(None)?;
+        self.session.keep_tables(false);
+        Ok(())
     }
 
     /// Makes the first frame, or one after an edit.

@@ -96,7 +96,8 @@ impl Declared {
                 // Planning leaves passes out and keeps the order of the others; what was appended later is no update.
                 let same = |(name, why): &(String, String)| *name == pass.name && *why == pass.why;
                 let found = declared[next..].iter().position(same).map(|skipped| next + skipped);
-                is_update.push(found.is_some_and(|index| updates.contains(&index)));
+                let brings_back = pass.name.starts_with("download ");
+                is_update.push(!brings_back && found.is_some_and(|index| updates.contains(&index)));
                 next = found.map_or(next, |index| index + 1);
             }
             is_update
@@ -218,6 +219,12 @@ impl Session {
         }
     }
 
+    /// Whether frames take tables from the cache, and store those that they make.
+    pub fn keep_tables(&mut self, keep: bool) {
+        let cache = self.cache.clone().filter(|_| keep);
+        self.renderer.keep_tables(cache.map(|cache| (cache, self.executor.device().info())));
+    }
+
     /// Makes the tables that take too long for a frame, or takes them from the cache.
     pub fn precompute(&mut self, progress: &mut Progress) -> Result<Vec<Update>, Failure> {
         let mut show = |what: &str, done, total| progress.update(what, done, total);
@@ -282,6 +289,7 @@ impl Session {
         let counts: Vec<_> =
             frame.rays.iter().filter(|_| wanted.picture).map(|of| (of.pass, g.download(&of.counts))).collect();
         let mut run = self.executor.run(std::mem::take(g), timing)?;
+        std::mem::take(&mut frame.made).into_iter().for_each(|table| table.store(&mut run));
         let picture = pictures.map(|(radiance, display)| Picture {
             size,
             radiance: floats(&run.take(radiance)),

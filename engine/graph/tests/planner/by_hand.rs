@@ -349,3 +349,25 @@ fn an_empty_frame_is_an_empty_plan() {
     assert!(plan.steps.is_empty());
     assert_eq!((plan.shared_bytes, plan.unshared_bytes), (0, 0));
 }
+
+#[test]
+fn bytes_that_are_known_take_the_place_of_the_passes_that_make_them() {
+    let mut g = Graph::new();
+    let mut table = Buffer::new("table", 64, Lifetime::Settings);
+    let mut shown = kept("shown", Lifetime::Settings);
+    g.because("first frame");
+    pass(&mut g, "before", vec![], vec![&mut shown]);
+    let first = g.passes().len();
+    g.fill(&mut table, 0);
+    g.upload(&mut table, vec![1; 64]);
+    g.upload_instead(first, table.resource(), vec![2; 64].into(), "read from the cache");
+    pass(&mut g, "after", vec![&shown], vec![]);
+    let said: Vec<_> = g.passes().iter().map(|pass| (pass.name.as_str(), pass.why.as_str())).collect();
+    let expected = [("before", "first frame"), ("upload table", "read from the cache"), ("after", "first frame")];
+    assert_eq!(said, expected);
+    assert!(matches!(&g.passes()[first].work, Work::Upload { data } if **data == [2; 64]));
+    // In the place of nothing it bears its own name.
+    let mut g = Graph::new();
+    g.upload_instead(0, table.resource(), vec![3; 64].into(), "known");
+    assert_eq!((g.passes()[0].name.as_str(), g.passes()[0].why.as_str()), ("upload table", "known"));
+}

@@ -48,6 +48,7 @@ impl Census {
         let shadows = match (lights.count(), occlusion) {
             (0, _) => Err("no point, directional or spot lights".to_owned()),
             (_, false) => Err("occlusion is off".to_owned()),
+            (1, true) => Ok("1 light may be hidden".to_owned()),
             (count, true) => Ok(format!("{count} lights may be hidden")),
         };
         add("shadows", e::SHADOWS, shadows);

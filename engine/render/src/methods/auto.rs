@@ -1,6 +1,6 @@
 //! The method of a material that leaves the choice to the renderer: by what its census says, and what was measured.
 
-use super::{DEFAULT_METHOD, METHODS, MethodInfo};
+use super::{METHODS, MethodInfo, default_method};
 use crate::GlintMaterial;
 use crate::census::{EnvironmentCensus, LightCensus};
 
@@ -37,6 +37,5 @@ pub(crate) fn choose(
         let by = if lights.count() > 0 { "lights" } else { "an even environment" };
         ("deliot_belcour", format!("many small flakes under {by} are estimated in constant time"))
     };
-    let found = METHODS.iter().find(|method| method.name == name);
-    (found.or_else(|| METHODS.iter().find(|method| method.name == DEFAULT_METHOD)).unwrap_or(&METHODS[0]), why)
+    (METHODS.iter().find(|method| method.name == name).unwrap_or_else(|| default_method()), why)
 }

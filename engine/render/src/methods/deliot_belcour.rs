@@ -32,6 +32,7 @@
 use super::shared::Shared;
 use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
+use crate::kept::Kept;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Buffer, Extent, Graph, Image, Lifetime};
 use mica_shaders::constants::DELIOT_BELCOUR_NOISE_SIZE;
@@ -115,7 +116,13 @@ fn normals(alpha: f64) -> f64 {
 }
 
 impl Method for DeliotBelcour {
-    fn update(&mut self, g: &mut Graph, materials: &[GlintMaterial], _environment: &EnvironmentTables) {
+    fn update(
+        &mut self,
+        g: &mut Graph,
+        _kept: &mut Kept,
+        materials: &[GlintMaterial],
+        _environment: &EnvironmentTables,
+    ) {
         self.noise.update(
             materials,
             |_| Some(()),

@@ -18,6 +18,7 @@
 use super::shared::{Shared, Wanted};
 use super::{Claim, GlintMaterial, Method, MethodInfo, Reads, Rung, Shading, bind_glints, leaf_level};
 use crate::environment_tables::EnvironmentTables;
+use crate::kept::Kept;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Buffer, Extent, Graph, Image, Lifetime};
 use mica_shaders::glints::flakes::{Bind, Params};
@@ -114,7 +115,13 @@ fn count_flakes(g: &mut Graph, wanted: Wanted<FlakeSet, Buffer>) -> Buffer {
 }
 
 impl Method for EveryFlake {
-    fn update(&mut self, g: &mut Graph, materials: &[GlintMaterial], _environment: &EnvironmentTables) {
+    fn update(
+        &mut self,
+        g: &mut Graph,
+        _kept: &mut Kept,
+        materials: &[GlintMaterial],
+        _environment: &EnvironmentTables,
+    ) {
         let set = |material: &GlintMaterial| Some((material.flakes(), material.values.number("seed") as u32));
         self.counts.update(materials, set, |wanted| Some(count_flakes(g, wanted)));
     }
@@ -125,7 +132,7 @@ impl Method for EveryFlake {
 
     fn shade(&self, g: &mut Graph, material: &GlintMaterial, shading: &Shading, glints: &mut Image) {
         let half_angle_radians = material.values.number("gamma_deg").to_radians();
-        let Some(cones) = shading.environment.cones(half_angle_radians) else { return };
+        let cones = shading.environment.cones(half_angle_radians);
         let Some(flake_counts) = self.counts.of(material) else { return };
         let count = material.flakes();
         let alpha = material.values.number("alpha");

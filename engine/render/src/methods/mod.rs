@@ -1,27 +1,20 @@
 //! How glints are estimated: each method in a file of its own, which says what it claims and what it can be set to.
 
-mod atanasov;
 mod auto;
-mod chermain;
-mod deliot_belcour;
+#[cfg(feature = "glints")]
 mod dpf;
-mod flakes;
-mod jakob;
-mod kemppinen;
 mod shared;
-mod shopf;
 mod smooth;
-mod wang2018;
-mod wang2020;
-mod wang_bowles;
-mod zirr_kaplanyan;
 
 pub use auto::AUTO_METHOD;
 pub(crate) use auto::choose;
+#[cfg(feature = "glints")]
 pub use dpf::lit_probability_table;
+#[cfg(feature = "glints")]
 pub use jakob::JakobTable;
 
 use crate::environment_tables::EnvironmentTables;
+use crate::kept::Kept;
 use crate::passes::{GBuffer, GlintTiles};
 use crate::scene_buffers::SceneBuffers;
 use crate::settings::{Kind, Setting, SettingError, Value, Values};
@@ -86,15 +79,21 @@ pub struct MethodInfo {
     pub ladder: &'static [Rung],
 }
 
-/// The one list of methods: what each says of itself, and how it is started.
+/// The one list of methods: what each says of itself, and how it is started. The smooth limit comes first, and is what a
+/// program built without the feature `glints` knows no more than the others.
 macro_rules! methods {
     ($($module:ident::$method:ident),* $(,)?) => {
+        $(#[cfg(feature = "glints")]
+        mod $module;)*
+
         /// The methods there are.
-        pub const METHODS: &[MethodInfo] = &[$($module::INFO),*];
+        pub const METHODS: &[MethodInfo] =
+            &[#[cfg(feature = "glints")] smooth::INFO, $(#[cfg(feature = "glints")] $module::INFO),*];
 
         /// The method of that name, at work.
         pub(crate) fn start(info: &MethodInfo) -> Box<dyn Method> {
-            $(if info.name == $module::INFO.name {
+            $(#[cfg(feature = "glints")]
+            if info.name == $module::INFO.name {
                 return Box::new($module::$method::default());
             })*
             Box::new(smooth::Smooth::default())
@@ -103,7 +102,6 @@ macro_rules! methods {
 }
 
 methods! {
-    smooth::Smooth,
     flakes::EveryFlake,
     jakob::Jakob,
     wang2018::Wang2018,
@@ -181,7 +179,7 @@ pub fn check_method(name: &str) -> Result<(), SettingError> {
 
 /// The method of materials that name none.
 pub(crate) fn default_method() -> &'static MethodInfo {
-    METHODS.iter().find(|method| method.name == DEFAULT_METHOD).unwrap_or(&METHODS[0])
+    METHODS.iter().find(|method| method.name == DEFAULT_METHOD).unwrap_or(&smooth::INFO)
 }
 
 impl MethodInfo {
@@ -309,7 +307,14 @@ pub(crate) trait Method {
 
     /// Declares the passes that bring the tables of its materials up to date, none where nothing they depend on changed, and
     /// gives back what these materials do not use.
-    fn update(&mut self, _g: &mut Graph, _materials: &[GlintMaterial], _environment: &EnvironmentTables) {}
+    fn update(
+        &mut self,
+        _g: &mut Graph,
+        _kept: &mut Kept,
+        _materials: &[GlintMaterial],
+        _environment: &EnvironmentTables,
+    ) {
+    }
 
     /// What it reads of the environment, where there is one.
     fn reads(&self) -> Reads {

@@ -31,6 +31,7 @@ use super::dpf::{self, AccumulatedKey, DpfSource};
 use super::shared::Shared;
 use super::{Claim, GlintMaterial, Method, MethodInfo, Reads, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
+use crate::kept::Kept;
 use crate::settings::{Kind, Setting, Value};
 use crate::{Cache, Progress, RenderError, Update};
 use mica_gpu::Executor;
@@ -153,7 +154,13 @@ impl Method for Wang2018 {
         Ok(vec![update])
     }
 
-    fn update(&mut self, g: &mut Graph, materials: &[GlintMaterial], _environment: &EnvironmentTables) {
+    fn update(
+        &mut self,
+        g: &mut Graph,
+        _kept: &mut Kept,
+        materials: &[GlintMaterial],
+        _environment: &EnvironmentTables,
+    ) {
         let there = self.dpf.keys();
         // Counting takes too long for a frame: it happens in `precompute`, and a table by quadrature stands in without it.
         let found = |material: &GlintMaterial| {

@@ -1,6 +1,6 @@
 //! The environment's tables: what a diffuse surface and a smooth lobe see of it.
 
-use crate::environment_tables::{Lobe, Ndf};
+use crate::environment_tables::Ndf;
 use mica_graph::{Extent, Graph, Image};
 use mica_shaders::{constants as c, environment_irradiance, environment_specular, specular_albedo};
 
@@ -29,19 +29,22 @@ pub(crate) fn irradiance(g: &mut Graph, map: &Image, irradiance: &mut Image) {
     g.pass(environment_irradiance::Bind { environment: map, irradiance }, params, extent);
 }
 
-/// Fills the two tables of a lobe.
-pub(crate) fn specular(g: &mut Graph, map: &Image, ndf: Ndf, lobe: &mut Lobe) {
+/// Fills what a lobe sees of the map, one roughness a layer.
+pub(crate) fn specular(g: &mut Graph, map: &Image, ndf: Ndf, prefiltered: &mut Image) {
     let desc = map.desc();
-    let beckmann = u32::from(ndf == Ndf::Beckmann);
     let params = environment_specular::Params {
         samples: SPECULAR_SAMPLES,
-        beckmann,
+        beckmann: u32::from(ndf == Ndf::Beckmann),
         texel_solid_angle: 4.0 * std::f32::consts::PI / desc.extent.texels() as f32,
         max_level: (desc.mips - 1) as f32,
     };
-    let extent = Extent { depth: c::SPECULAR_LAYERS, ..lobe.prefiltered.extent() };
-    g.pass(environment_specular::Bind { environment: map, prefiltered: &mut lobe.prefiltered }, params, extent);
-    let params = specular_albedo::Params { samples: ALBEDO_SAMPLES, beckmann };
-    let extent = lobe.albedo.extent();
-    g.pass(specular_albedo::Bind { albedo: &mut lobe.albedo }, params, extent);
+    let extent = Extent { depth: c::SPECULAR_LAYERS, ..prefiltered.extent() };
+    g.pass(environment_specular::Bind { environment: map, prefiltered }, params, extent);
+}
+
+/// Fills a lobe's directional albedo by cosine and roughness.
+pub(crate) fn albedo(g: &mut Graph, ndf: Ndf, albedo: &mut Image) {
+    let params = specular_albedo::Params { samples: ALBEDO_SAMPLES, beckmann: u32::from(ndf == Ndf::Beckmann) };
+    let extent = albedo.extent();
+    g.pass(specular_albedo::Bind { albedo }, params, extent);
 }

@@ -273,6 +273,14 @@ fn glinting() -> Vec<Row> {
              flake_counts",
         ),
         row(
+            "every flake in the sun, where there is no sky to mirror",
+            of("flakes").light(sun()),
+            "GLINTS DIRECTIONAL_LIGHTS SHADOWS",
+            "fill ray_counts, shadows [occlusion=bvh], upload tile_lists, glint_tiles, clear specular_layer, \
+             fill flake_walkers, glints [method=flakes], composite",
+            "upload bvh_nodes, upload bvh_triangles, upload bvh_instances, upload flake_counts 0, flake_counts",
+        ),
+        row(
             "a masked glitter",
             black().left(masked(glitter("kemppinen"))).light(point()),
             "ALPHA_MASKS GLINTS POINT_LIGHTS SHADOWS",

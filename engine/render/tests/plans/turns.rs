@@ -4,7 +4,7 @@ use crate::scenes::{Declared, black, chalk, coated, declare, glitter, masked, me
 use mica_graph::Effects;
 use mica_render::Renderer;
 use mica_render::scene::{Light, Material};
-use mica_shaders::effects as e;
+use mica_shaders::{base, blur_glints, composite, effects as e, surface, tonemap};
 
 /// A frame after all tables are there.
 fn settled(renderer: &mut Renderer) -> Declared {
@@ -130,4 +130,14 @@ fn a_method_that_is_left_to_the_renderer_follows_the_light() {
     assert_eq!(chosen(&renderer), "wang2020");
     renderer.set_method(None, "smooth").expect("a method");
     assert_eq!((renderer.materials()[0].method.name, &renderer.materials()[0].chosen), ("smooth", &None));
+}
+
+#[test]
+fn shaders_are_specialised_for_nothing_that_their_code_does_not_ask_about() {
+    let lights = e::POINT_LIGHTS | e::DIRECTIONAL_LIGHTS | e::SPOT_LIGHTS;
+    assert_eq!(tonemap::SHADER.effects, Effects::NONE);
+    assert_eq!(blur_glints::SHADER.effects, Effects::NONE);
+    assert_eq!(composite::SHADER.effects, e::CLEAR_COAT);
+    assert_eq!(surface::SHADER.effects, e::TEXTURES | e::NORMAL_MAPS | e::VERTEX_COLORS | e::GLINTS);
+    assert!(base::SHADER.effects.contains(lights), "it sums over lights");
 }

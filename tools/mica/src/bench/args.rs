@@ -8,7 +8,7 @@ use std::path::PathBuf;
 /// `mica bench`.
 #[derive(Debug, Args)]
 #[command(
-    after_long_help = "Without --occlusion, every method with every rung of its ladder (see `mica methods`) at every scene, size and \
+    after_long_help = "Without --occlusion, --coverage and --paper, every method with every rung of its ladder (see `mica methods`) at every scene, size and \
     lighting. The time of glints is that of a frame with them less that of the same frame without, in turns in one \
     run: processor time of the process where the device is the processor, timestamps of the device elsewhere. Figures \
     are medians over the rounds of three sittings, between which all other points of the place are timed; after ± (+a/-b where these differ by more than a third) stands what rounds and \

@@ -45,10 +45,15 @@ impl Wish {
     /// The goal in words.
     pub fn words(&self) -> String {
         match self.goal {
-            Goal::Budget { ns } => format!("{} ms of glints", ns * 1e-6),
-            Goal::TargetError(error) => format!("{} error of {error}", self.metric.name()),
+            Goal::Budget { ns } => format!("{} ms of glints", number(ns / 1e6)),
+            Goal::TargetError(error) => format!("a {} error of {}", self.metric.name(), number(error)),
         }
     }
+}
+
+/// A number as people write it, without rows of zeros.
+fn number(figure: f64) -> String {
+    if figure == 0.0 || (1e-6..1e6).contains(&figure) { format!("{figure}") } else { format!("{figure:e}") }
 }
 
 /// More than a week a frame.
@@ -76,6 +81,18 @@ fn metric(text: &str) -> Result<Metric, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn goals_are_told_as_they_were_asked_for() {
+        let words = |goal| Wish { goal, metric: Metric::W1 }.words();
+        for (asked, told) in [("4", "4"), ("5.8", "5.8"), ("1e-6", "0.000001"), ("1e9", "1e9"), ("1e-300", "1e-300")] {
+            let ns = budget_ms(asked).expect("a budget") * 1e6;
+            assert_eq!(words(Goal::Budget { ns }), format!("{told} ms of glints"));
+            let error = target_error(asked).expect("an error");
+            assert_eq!(words(Goal::TargetError(error)), format!("a w1 error of {told}"));
+        }
+        assert_eq!(words(Goal::TargetError(0.0)), "a w1 error of 0");
+    }
 
     #[test]
     fn goals_are_numbers_that_can_be_reached() {

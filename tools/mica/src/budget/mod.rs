@@ -153,7 +153,7 @@ fn nothing_fits(wish: &Wish, nothing: &NothingFits) -> Failure {
     let of = |point: &Point| {
         let error = point.errors.as_ref().and_then(|errors| metric.of(errors)).filter(|error| error.value.is_finite());
         let error = error.map_or_else(String::new, |of| format!(", {} error {}", metric.name(), report::error(of)));
-        format!("{} at {}{error}", point.name(), report::times(point.cost.glints, point.cost.frame))
+        format!("{}, which takes {}{error}", point.name(), report::times(point.cost.glints, point.cost.frame))
     };
     let (found, advice) = match nothing {
         NothingFits::OverBudget { cheapest } => {

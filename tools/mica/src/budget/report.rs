@@ -12,6 +12,9 @@ use serde_json::{Map, Value as Json};
 #[derive(Serialize)]
 pub struct BudgetReport {
     pub goal: GoalReport,
+    /// The same in words.
+    #[serde(skip)]
+    pub asked: String,
     /// What an error is.
     pub metric: &'static str,
     pub chosen: StepReport,
@@ -69,13 +72,14 @@ impl BudgetReport {
     pub fn new(wish: &Wish, choice: &Choice, args: &SceneArgs, skipped: Vec<Skipped>) -> Self {
         let step = |point: &Point| StepReport::new(point, wish.metric, args);
         let (budget_ms, target_error) = match wish.goal {
-            Goal::Budget { ns } => (Some(ns * 1e-6), None),
+            Goal::Budget { ns } => (Some(ns / 1e6), None),
             Goal::TargetError(error) => (None, Some(error)),
         };
         let of_skipped =
             |Skipped { candidate: (method, rung), why }| SkippedReport { method: method.name, rung: rung.name, why };
         Self {
             goal: GoalReport { budget_ms, target_error },
+            asked: wish.words(),
             metric: wish.metric.name(),
             chosen: step(choice.chosen),
             next_better: choice.next_better.map(step),
@@ -88,11 +92,7 @@ impl BudgetReport {
 
     /// Lines for people, each ended.
     pub fn words(&self) -> String {
-        let goal = match self.goal {
-            GoalReport { budget_ms: Some(ms), .. } => format!("{ms} ms of glints"),
-            GoalReport { target_error, .. } => format!("{} error {}", self.metric, target_error.unwrap_or_default()),
-        };
-        let mut text = format!("chosen for {goal}: {}\n", self.chosen.words(self.metric));
+        let mut text = format!("chosen for {}: {}\n", self.asked, self.chosen.words(self.metric));
         let steps =
             [("next better", "more accurate", &self.next_better), ("next cheaper", "cheaper", &self.next_cheaper)];
         for (title, adjective, step) in steps {

@@ -27,13 +27,14 @@ pub fn explain(args: &ExplainArgs) -> Result<(), Failure> {
     let is_update = updates_of(&plan);
     let later = session.declare(None)?;
     let later = session.executor.plan(later.graph)?;
+    let is_later = |pass: &Pass| later.passes.iter().any(|other| (&other.name, &other.why) == (&pass.name, &pass.why));
+    let is_once: Vec<bool> =
+        plan.passes.iter().zip(is_update).map(|(pass, is_update)| is_update || !is_later(pass)).collect();
     let effects = effects::report(&mut session, args.cost)?;
 
     let bytes: BTreeMap<ResourceId, u64> =
         plan.resources.iter().map(|usage| (usage.resource.id, usage.bytes)).collect();
-    let is_update_of_plan = is_update.clone();
-    let passes = plan.passes.iter().zip(is_update);
-    let passes = passes.map(|(pass, is_update)| PassReport::new(pass, is_update, &bytes)).collect();
+    let passes = plan.passes.iter().zip(&is_once).map(|(pass, once)| PassReport::new(pass, *once, &bytes)).collect();
     let report = ExplainReport {
         schema: "mica-explain-1",
         scene: session.scene.clone(),
@@ -48,7 +49,7 @@ pub fn explain(args: &ExplainArgs) -> Result<(), Failure> {
         culled: plan.culled.clone(),
         first_frame: FrameReport::new(&plan),
         later_frames: FrameReport::new(&later),
-        tables: tables(&plan, &is_update_of_plan),
+        tables: tables(&plan, &is_once),
         resources: resources(&plan),
         total_bytes: effects::bytes(&plan),
         left_out,

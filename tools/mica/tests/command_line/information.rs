@@ -51,6 +51,8 @@ fn a_plan_is_explained_without_rendering() {
     let prefilter = of("prefilter").expect("a pass of the default method");
     assert_eq!(prefilter["once"], true);
     assert!(prefilter["reads"].as_array().is_some_and(|reads| !reads.is_empty()));
+    // What comes after the tables and yet not in every frame.
+    assert_eq!(of("upload materials").expect("a part of the scene")["once"], true);
     let composite = of("composite").expect("a pass of the default method");
     assert_eq!(composite["once"], false);
     assert!(

@@ -91,6 +91,37 @@ fn two_runs_give_the_same_bytes() {
 }
 
 #[test]
+fn a_second_start_reads_what_the_first_one_made() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let cache = in_folder(folder.path(), "cache");
+    let start = |method: &str, name: &str| {
+        let path = in_folder(folder.path(), name);
+        let of_method = ["--method", method, "--env", "dusk", "--cache", &cache, "-o", &path];
+        let report = report(&[&SMALL, &of_method]);
+        (report, fs::read(path).expect("a picture"))
+    };
+    for (method, table) in
+        [("wang2020", "prefilter"), ("kemppinen", "environment_specular"), ("flakes", "flake_counts")]
+    {
+        let (first, picture) = start(method, "first.exr");
+        let (second, same) = start(method, "second.exr");
+        assert!(picture == same, "{method}: another picture");
+        let is_read = |report: &Json| {
+            let updates = report["updates"].as_array().expect("a list");
+            let update = updates.iter().find(|update| update["pass"] == table);
+            update.unwrap_or_else(|| panic!("{table} in {updates:?}"))["why"] == "read from the cache"
+        };
+        // What makes no picture dear is not kept.
+        let is_kept = table != "flake_counts";
+        assert_eq!((is_read(&first), is_read(&second)), (false, is_kept), "{method}");
+        let pipelines = |report: &Json| report["start"]["pipelines"].as_u64().expect("a number");
+        assert_eq!(pipelines(&second) < pipelines(&first), is_kept, "{method}");
+    }
+    let cones = |name: &String| name.starts_with("environment_cone");
+    assert_eq!(names_in(Path::new(&cache)).iter().filter(|name| cones(name)).count(), 1);
+}
+
+#[test]
 fn an_exr_says_what_it_shows() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = in_folder(folder.path(), "a.exr");

@@ -72,7 +72,7 @@ fn a_study_goes_on_where_it_ended_and_comes_out_the_same() {
         let of_sittings =
             cost["sittings"].as_array().expect("a list").iter().map(|rounds| rounds.as_array().map(Vec::len));
         assert_eq!(of_sittings.collect::<Vec<_>>(), [Some(1); 3]);
-        assert!(least("frame") > 0.0 && !cost["passes"].as_array().expect("a list").is_empty());
+        assert!(value("frame") > 0.0 && !cost["passes"].as_array().expect("a list").is_empty());
         // What glints need holds all tables of the method, and not the scene.
         let bytes = cost["glint_bytes"].as_u64().expect("bytes");
         let rows = cost["memory"].as_array().expect("a list");

@@ -8,17 +8,17 @@ use std::fs;
 
 #[test]
 fn f36_every_flipped_bit_of_an_entry_is_seen() {
-    let entry = Cache::entry(&(0..=255).collect::<Vec<u8>>());
-    assert!(Cache::payload(&entry).is_some());
+    let entry = Cache::entry("table", &(0..=255).collect::<Vec<u8>>());
+    assert!(Cache::payload("table", &entry).is_some());
     for bit in 0..entry.len() * 8 {
         let mut damaged = entry.clone();
         damaged[bit / 8] ^= 1 << (bit % 8);
-        assert_eq!(Cache::payload(&damaged), None, "bit {bit}");
+        assert_eq!(Cache::payload("table", &damaged), None, "bit {bit}");
     }
     for length in 0..entry.len() {
-        assert_eq!(Cache::payload(&entry[..length]), None, "cut to {length}");
+        assert_eq!(Cache::payload("table", &entry[..length]), None, "cut to {length}");
     }
-    assert_eq!(Cache::payload(&[&entry[..], b"x"].concat()), None, "a byte more");
+    assert_eq!(Cache::payload("table", &[&entry[..], b"x"].concat()), None, "a byte more");
 }
 
 #[test]
@@ -35,10 +35,26 @@ fn f36_a_damaged_cache_is_said_made_again_and_changes_no_picture() {
     assert_eq!(place.rendered(&arguments), "");
     let expected = picture();
     // Beside the tables lie pipelines, in a file of the driver's own form.
-    let mut entries = fs::read_dir(&cache).expect("a folder").map(|entry| entry.expect("an entry").path());
-    let is_table =
-        |path: &PathBuf| !path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("pipelines"));
-    let entry = entries.find(is_table).expect("tables are kept");
+    let mut entries: Vec<PathBuf> =
+        fs::read_dir(&cache).expect("a folder").map(|entry| entry.expect("an entry").path()).collect();
+    entries.retain(|path| !path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("pipelines")));
+    entries.sort();
+    let of = |table: &str| entries.iter().find(|path| path.to_string_lossy().contains(table)).cloned();
+    for table in ["dpf", "prefiltered"] {
+        let entry = of(table).unwrap_or_else(|| panic!("{table} in {entries:?}"));
+        let key = entry.file_stem().expect("a name").to_string_lossy().into_owned();
+        let whole = fs::read(&entry).expect("an entry");
+        // What nobody stored, though it bears the marks of what was.
+        for (bytes, says) in
+            [(whole[..whole.len() / 2].to_vec(), true), (Cache::entry(&key, b"of another size"), false)]
+        {
+            fs::write(&entry, bytes).expect("an entry");
+            let said = place.rendered(&arguments);
+            assert_eq!(said.contains("is damaged or of another version"), says, "{table}: {said}");
+            assert!(picture() == expected && fs::read(&entry).expect("an entry") == whole, "{table}");
+        }
+    }
+    let entry = of("prefiltered").expect("tables are kept");
     let whole = fs::read(&entry).expect("an entry");
     let with = |at: usize, bytes: &[u8]| {
         let mut damaged = whole.clone();

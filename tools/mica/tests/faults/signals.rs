@@ -54,8 +54,30 @@ fn f34_who_is_asked_to_end_keeps_the_samples_and_a_second_time_ends_at_once() {
     // Both wait for it when it goes on.
     signal(&child, &["STOP", "INT", "TERM", "CONT"]);
     let after: Vec<String> = lines.collect();
-    assert_eq!((child.wait().expect("it ends").code(), after), (Some(130), Vec::new()));
+    assert_eq!(child.wait().expect("it ends").code(), Some(130));
+    assert_eq!(after, ["mica: interrupted again: what was under way is given up"]);
     assert_eq!(names_in(folder.path()), [""; 0]);
+}
+
+#[test]
+fn f34_who_is_asked_to_end_before_there_is_anything_to_keep_says_so_and_ends() {
+    for (name, bit) in [("INT", 1), ("TERM", 14)] {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = in_folder(folder.path(), "a.png");
+        // A million triangles are made first.
+        let mut render = mica();
+        let child = render.args(["render", "drift", "--quiet", "-o", &path]).stderr(Stdio::piped()).spawn();
+        let child = child.expect("mica starts");
+        wait_until("a handler", || {
+            let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
+            let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).map(str::trim);
+            mask.and_then(|mask| u64::from_str_radix(mask, 16).ok()).is_some_and(|mask| mask >> bit & 1 == 1)
+        });
+        signal(&child, &[name]);
+        let error = failed(&child.wait_with_output().expect("it ends"), 130, &[]);
+        assert_eq!(error, "mica: interrupted\n");
+        assert_eq!(names_in(folder.path()), [""; 0]);
+    }
 }
 
 #[test]

@@ -45,6 +45,7 @@ mod dictionary;
 use super::shared::Shared;
 use super::{Claim, GlintMaterial, Method, MethodInfo, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
+use crate::kept::Kept;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Buffer, Graph, Image, Lifetime};
 use mica_shaders::glints::chermain::{Bind, Params};
@@ -138,7 +139,13 @@ fn lobe(material: &GlintMaterial) -> f64 {
 }
 
 impl Method for Chermain {
-    fn update(&mut self, g: &mut Graph, materials: &[GlintMaterial], _environment: &EnvironmentTables) {
+    fn update(
+        &mut self,
+        g: &mut Graph,
+        _kept: &mut Kept,
+        materials: &[GlintMaterial],
+        _environment: &EnvironmentTables,
+    ) {
         let of = |material: &GlintMaterial| Some(lobe(material));
         self.dictionaries.update(materials, of, |mut wanted| {
             let change = if wanted.before.is_some() { "lobes are now" } else { "first frame with lobes" };

@@ -6,10 +6,11 @@ mod accumulated;
 pub(super) use accumulated::{AccumulatedKey, accumulated};
 
 use super::GlintMaterial;
+use crate::kept::Inputs;
 use crate::{Cache, Progress, RenderError, Update};
 use mica_gpu::{Executor, Timing};
 use mica_graph::{Buffer, Extent, Graph, Lifetime};
-use mica_shaders::{constants as c, dpf, dpf_count, dpf_divide};
+use mica_shaders::{constants as c, dpf, dpf_accumulate, dpf_count, dpf_divide};
 use std::time::Instant;
 
 /// Half-angle of the tabulated cones, in degrees.
@@ -56,6 +57,12 @@ impl DpfSource {
             Self::Counted { flakes } => format!("dpf-counted-{flakes}-{made_by}"),
         }
     }
+}
+
+/// What P(i, o, gamma) is made by, from tables at these roughnesses.
+pub(super) fn made_by(inputs: Inputs, alphas: &[f32]) -> Inputs {
+    let shaders = [&dpf::SHADER, &dpf_count::SHADER, &dpf_divide::SHADER, &dpf_accumulate::SHADER];
+    shaders.into_iter().fold(inputs.and(format_args!("{alphas:?}")), Inputs::by)
 }
 
 /// Bytes of the tables of so many roughnesses.

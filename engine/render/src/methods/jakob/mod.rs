@@ -34,6 +34,7 @@ mod triangles;
 use super::shared::Shared;
 use super::{Claim, GlintMaterial, Method, MethodInfo, Reads, Rung, Shading, bind_glints, leaf_level};
 use crate::environment_tables::EnvironmentTables;
+use crate::kept::Kept;
 use crate::settings::{Kind, Setting, Value};
 use mica_graph::{Buffer, Graph, Image, Lifetime};
 use mica_shaders::constants as c;
@@ -121,7 +122,13 @@ struct Table {
 }
 
 impl Method for Jakob {
-    fn update(&mut self, g: &mut Graph, materials: &[GlintMaterial], _environment: &EnvironmentTables) {
+    fn update(
+        &mut self,
+        g: &mut Graph,
+        _kept: &mut Kept,
+        materials: &[GlintMaterial],
+        _environment: &EnvironmentTables,
+    ) {
         let alpha = |material: &GlintMaterial| Some(material.values.number("alpha"));
         self.tables.update(materials, alpha, |wanted| {
             let change = if wanted.before.is_some() { "alpha is now" } else { "first frame with alpha" };

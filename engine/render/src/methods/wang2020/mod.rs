@@ -23,6 +23,7 @@ use super::dpf::{self, DpfSource};
 use super::shared::Shared;
 use super::{Claim, Finish, GlintMaterial, Method, MethodInfo, Reads, Rung, Shading, bind_glints};
 use crate::environment_tables::EnvironmentTables;
+use crate::kept::Kept;
 use crate::settings::{Kind, Setting, Value};
 use crate::{Cache, Progress, RenderError, Update};
 use mica_gpu::Executor;
@@ -156,7 +157,7 @@ impl Method for Wang2020 {
         Ok(vec![update])
     }
 
-    fn update(&mut self, g: &mut Graph, materials: &[GlintMaterial], environment: &EnvironmentTables) {
+    fn update(&mut self, g: &mut Graph, kept: &mut Kept, materials: &[GlintMaterial], environment: &EnvironmentTables) {
         let there = self.dpf.keys();
         // Counting takes too long for a frame: it happens in `precompute`, and a table by quadrature stands in without it.
         let found = |material: &GlintMaterial| {
@@ -173,7 +174,7 @@ impl Method for Wang2020 {
         );
         let accumulated =
             |material: &GlintMaterial| (alpha(material), material.values.number("gamma_deg"), found(material));
-        self.tables.update(g, materials, accumulated, &self.dpf, environment);
+        self.tables.update((g, kept), materials, accumulated, &self.dpf, environment);
     }
 
     fn reads(&self) -> Reads {

@@ -2,6 +2,7 @@
 
 use super::ALPHAS;
 use crate::environment_tables::EnvironmentTables;
+use crate::kept::{Inputs, Kept};
 use crate::methods::GlintMaterial;
 use crate::methods::dpf::{self, AccumulatedKey, DpfSource};
 use crate::methods::shared::{Shared, Wanted};
@@ -72,7 +73,7 @@ impl Tables {
     /// Declares the passes of every table that these materials use and that is not there.
     pub fn update(
         &mut self,
-        g: &mut Graph,
+        (g, kept): (&mut Graph, &mut Kept),
         materials: &[GlintMaterial],
         key: impl Fn(&GlintMaterial) -> AccumulatedKey,
         dpf: &Shared<DpfSource, Buffer>,
@@ -96,7 +97,7 @@ impl Tables {
         };
         self.prefiltered.update(materials, prefiltered, |wanted| {
             let accumulated = self.accumulated.get(wanted.key.accumulated)?;
-            Some(prefilter(g, wanted, accumulated, environment))
+            Some(prefilter((g, kept), wanted, accumulated, environment))
         });
         let quadtree = |material: &GlintMaterial| {
             let [seed, depth] = ["seed", "depth"].map(|key| material.values.number(key) as u32);
@@ -107,7 +108,7 @@ impl Tables {
 }
 
 fn prefilter(
-    g: &mut Graph,
+    (g, kept): (&mut Graph, &mut Kept),
     wanted: Wanted<PrefilteredKey, Buffer>,
     accumulated: &Buffer,
     environment: &EnvironmentTables,
@@ -122,26 +123,25 @@ fn prefilter(
     };
     wanted.because(g, change);
     let directions = c::PREFILTER_THETA_O * c::PREFILTER_PHI_O;
-    let mut probability = g.buffer("prefilter_probability", u64::from(directions) * 4);
-    let params = prefilter_probability::Params {
+    let of_probability = prefilter_probability::Params {
         alpha: alpha as f32,
         sin2_half_gamma: wanted.material.sin2_half_gamma() as f32,
         closed: u32::from(closed),
     };
-    let bind = prefilter_probability::Bind { accumulated, probability: &mut probability };
-    g.pass(bind, params, Extent::line(directions));
-    let new = || Buffer::new("prefiltered", PREFILTER_ENTRIES * 16, Lifetime::Settings);
-    let mut prefiltered = wanted.spare.unwrap_or_else(new);
     let params = prefilter::Params { alpha: alpha as f32, samples: samples as u32 };
-    let bind = prefilter::Bind {
-        environment: environment.map(),
-        probability: &probability,
-        accumulated,
-        prefiltered: &mut prefiltered,
-    };
-    let rows = c::PREFILTER_THETA_N * c::PREFILTER_PHI_N * c::PREFILTER_THETA_O;
-    g.pass(bind, params, Extent::new(c::PREFILTER_PHI_O, rows));
-    prefiltered
+    // P is made from these, by the shaders.
+    let made = |inputs: Inputs| dpf::made_by(inputs.and(format_args!("{:?}", wanted.key.accumulated)), &ALPHAS);
+    let inputs = environment.inputs().map(made);
+    let new = || Buffer::new("prefiltered", PREFILTER_ENTRIES * 16, Lifetime::Settings);
+    kept.table(g, inputs, wanted.spare.unwrap_or_else(new), |g, prefiltered| {
+        let mut probability = g.buffer("prefilter_probability", u64::from(directions) * 4);
+        let bind = prefilter_probability::Bind { accumulated, probability: &mut probability };
+        g.pass(bind, of_probability, Extent::line(directions));
+        let bind =
+            prefilter::Bind { environment: environment.map(), probability: &probability, accumulated, prefiltered };
+        let rows = c::PREFILTER_THETA_N * c::PREFILTER_PHI_N * c::PREFILTER_THETA_O;
+        g.pass(bind, params, Extent::new(c::PREFILTER_PHI_O, rows));
+    })
 }
 
 /// Nodes of a quadtree with leaves at this level.

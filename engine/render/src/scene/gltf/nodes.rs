@@ -2,7 +2,7 @@
 
 use super::accessor::named;
 use super::limits::LoadLimits;
-use crate::scene::{Camera, Light, SceneError, SceneErrorCode};
+use crate::scene::{Camera, EquirectMap, Light, SceneError, SceneErrorCode};
 use ::gltf::json;
 use ::gltf::json::extensions::scene::khr_lights_punctual as punctual;
 use ::gltf::json::validation::Checked;
@@ -11,6 +11,9 @@ use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 const DAMAGED: &str = "export the scene again, or mend it in an editor";
+
+/// The greatest power of a light, W/sr or W/m2: as for an environment, so that sums fit a 32-bit float.
+const MOST_POWER: f32 = EquirectMap::GREATEST;
 
 /// What the nodes of a scene place in the world.
 #[derive(Default)]
@@ -206,8 +209,8 @@ fn placed_light(light: &punctual::Light, world_from_node: DAffine3, location: &s
         SceneError::new(SceneErrorCode::ValueNotInRange, location, what, "set it in the exporter to a physical value")
     };
     let power = light.color.map(|c| c * light.intensity);
-    if power.iter().any(|p| !p.is_finite() || *p < 0.0) {
-        return Err(wrong(format!("colour times intensity is {power:?}, where 0 or more is needed")));
+    if !power.iter().all(|p| (0.0..=MOST_POWER).contains(p)) {
+        return Err(wrong(format!("colour times intensity is {power:?}, where 0 to {MOST_POWER:e} is needed")));
     }
     let range = light.range;
     if range.is_some_and(|range| range.is_nan() || range <= 0.0) {
